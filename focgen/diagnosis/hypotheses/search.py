@@ -112,10 +112,16 @@ def _started(
 ) -> list[Fit | None]:
     """The best start of each candidate: on all cores where the plant is one that is run in steps. The rest is
     quick, and mostly Python's own work, of which one thread at a time does any."""
-    own = thin.nominals.rig.actuator
-    if not (isinstance(own, LinearActuator) and plant_of(own.dynamics) and len(thin.segment.y) >= _LONG):
+    if not _in_steps(thin):
         return [best_start(thin, from_, candidate) for candidate in candidates]
     return abreast(lambda c: best_start(replace(thin, memory={}), from_, c), candidates)
+
+
+def _in_steps(problem: Problem) -> bool:
+    """Whether a run takes long by itself: of a plant that goes in steps."""
+    own = problem.nominals.rig.actuator
+    plant = isinstance(own, LinearActuator) and plant_of(own.dynamics)
+    return bool(plant) and len(problem.segment.y) >= _LONG
 
 
 def coarseness(problem: Problem) -> int:
@@ -271,12 +277,18 @@ def _further(of: Fit, at: Footing, iterations: int) -> Fit:
 
 
 def raced(tried: Sequence[Fit], weighing: Weighing, iterations: int, tolerance: float) -> list[Fit]:
-    """Each fitted further, the most promising first; one that falls behind is left there."""
+    """Each fitted further, the most promising first; one that falls behind is left there. On all cores those
+    behind the first, where a run takes long."""
+
+    def further(of: Fit, problem: Problem, leader: Fit | None) -> Fit:
+        return fit(problem, of.vector, weighing, iterations, tolerance, leader=leader)
+
     found: list[Fit] = []
-    for t in sorted(tried, key=lambda t: t.sse):
-        leader = min(found, key=lambda f: f.cost, default=None)
-        found.append(fit(t.problem, t.vector, weighing, iterations, tolerance, leader=leader))
-    return found
+    ordered = sorted(tried, key=lambda t: t.sse)
+    abroad = ordered[1:] if ordered and _in_steps(ordered[0].problem) else []
+    for t in ordered[: len(ordered) - len(abroad)]:
+        found.append(further(t, t.problem, min(found, key=lambda f: f.cost, default=None)))
+    return found + abreast(lambda t: further(t, replace(t.problem, memory={}), found[0]), abroad)
 
 
 def _likeliest(problem: Problem, at: Footing, starts: Sequence[np.ndarray]) -> list[np.ndarray]:
