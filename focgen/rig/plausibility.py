@@ -38,6 +38,9 @@ def doubts(rig: Rig, experiments: Sequence[Experiment]) -> tuple[str, ...]:
     time = _time(rig, experiments)
     if time:
         return time
+    twice = copied(rig, experiments)
+    if twice:
+        return (f"{twice[1]} holds the same samples as {twice[0]}; one column exported in both places?",)
     limits = {role: span for role, span in vars(rig.ranges).items() if span is not None}
     response = partial(links, rig, experiments)
     found = plausibility.doubts(experiments, limits, _units(rig), response)
@@ -144,6 +147,19 @@ def _responds_better(rig: Rig, experiments: Sequence[Experiment], faster: float)
     as_it_is, other = (links(rig, experiments, signals, f) for f in (1.0, faster))
     pairs = [(a.correlation, b.correlation) for a, b in zip(as_it_is, other) if a.known or b.known]
     return not pairs or sum(abs(b) - abs(a) for a, b in pairs) > 0.0
+
+
+def copied(rig: Rig, experiments: Sequence[Experiment]) -> tuple[str, str] | None:
+    """Two roles that hold the same samples throughout, with a stage between them that is not 1: no two gauges
+    have the same noise. None where there are none."""
+    roles = [role for role in _ROLES if all(role in e for e in experiments)]
+    for entry, exit in pairwise(roles):
+        stages = STAGES[_ROLES.index(entry) : _ROLES.index(exit)]
+        passes = all(stage != "actuator" and getattr(rig, stage) == UNITY for stage in stages)
+        alike = all(np.array_equal(e[entry], e[exit]) for e in experiments)
+        if not passes and alike and any(np.ptp(e[entry]) for e in experiments):
+            return entry, exit
+    return None
 
 
 def exchanged(rig: Rig, experiments: Sequence[Experiment]) -> bool:

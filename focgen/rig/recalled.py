@@ -138,12 +138,9 @@ def _is_known(log: Experiment, earlier: Sequence[Experiment], role: str) -> bool
 def goes_on(log: Experiment, earlier: Sequence[Experiment]) -> bool:
     """Whether a log goes on where the last of the ``earlier`` ones ended, by their clock."""
     last = max((other for other in earlier if "output" in other), key=ended, default=None)
-    if (
-        last is None
-        or log.paused
-        or "output" not in log
-        or log.start - ended(last) >= _NEXT * log.sample_time
-    ):
+    if last is None or log.paused or "output" not in log:
+        return False
+    if not 0.0 < log.start - ended(last) < _NEXT * log.sample_time:
         return False
     jump = abs(float(log["output"][0]) - float(last["output"][-1]))
     return jump <= _NOTHING * _largest(log, earlier, "output")

@@ -166,7 +166,11 @@ def behind_steps(half: float, dead: float, seed: int) -> list[Experiment]:
 @pytest.mark.parametrize("seed", (1, pytest.param(2, marks=pytest.mark.long)))
 @pytest.mark.parametrize(
     "half, dead, right",
-    [(4.0, 0.0, {"hysteresis", "sensor_hysteresis"}), (0.0, 3.0, {"dead_zone"}), (0.0, 0.0, None)],
+    [
+        (4.0, 0.0, {"hysteresis", "sensor_hysteresis"}),
+        pytest.param(0.0, 3.0, {"dead_zone"}, marks=pytest.mark.long),
+        (0.0, 0.0, None),
+    ],
 )
 def test_what_moves_the_times_of_the_steps_is_seen_through_them(half, dead, right, seed):
     """It changes less than half a step, and was held to be the steps' own."""

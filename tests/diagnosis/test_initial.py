@@ -47,7 +47,7 @@ def test_parameters_a_little_off_are_refitted_all_the_same():
     "effect, case",
     [
         ("transport_delay", {"delay": 4}),
-        ("dead_zone", {"zone": 0.045}),
+        pytest.param("dead_zone", {"zone": 0.045}, marks=pytest.mark.long),
         ("hysteresis", {"slip": 0.35}),
     ],
 )

@@ -202,6 +202,17 @@ def test_the_example_logs_stay_silent(example):
     assert "curvature and output exchanged" in doubts(rig, exchanged)[0], "whatever the camera's zero"
 
 
+@pytest.mark.parametrize("one, other", [("command", "pressure"), ("curvature", "output")])
+def test_a_column_in_two_places_is_told(example, one, other):
+    """Noise and all: no stage between them would leave that, but one that is 1."""
+    rig, logs = example
+    twice = [replace(log, signals={**log.signals, other: log[one].copy()}) for log in logs]
+    (told,) = doubts(rig, twice)
+    assert f"{other} holds the same samples as {one}" in told
+    passing = replace(rig, regulator=UNITY, sensor=UNITY)
+    assert not any("same samples" in line for line in doubts(passing, twice))
+
+
 def test_an_absolute_pressure_within_the_range_is_told_by_the_command_at_rest():
     """A range of 6 bar; the same values in an unnamed unit, or with the command up, may be right."""
     command = np.repeat([0.0, 2.0, 6.0, 0.0], 100)

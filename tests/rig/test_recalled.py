@@ -240,11 +240,13 @@ def test_a_recording_cut_in_two_goes_on_whatever_its_input_is(tmp_path: Path, at
     np.testing.assert_array_equal(made, exact)
 
 
-@pytest.mark.parametrize("change", ["late", "moved", "by a clock of its own"])
+@pytest.mark.parametrize("change", ["late", "early", "moved", "by a clock of its own"])
 def test_a_log_that_begins_elsewhere_or_later_does_not_go_on(tmp_path: Path, change: str) -> None:
     rig, (first, second) = _rig(tmp_path), _cut(100)
     if change == "late":
         second = replace(second, start=second.start + 3 * H)
+    elif change == "early":
+        second = replace(second, start=second.start - 3 * H)
     elif change == "by a clock of its own":
         second = replace(second, paused=True)
     else:
