@@ -7,10 +7,8 @@ by the part of y that g changes by.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
-
-import numpy as np
 
 from focgen.arrays import Array
 from focgen.fractional.transfer import TransferFunction
@@ -18,6 +16,7 @@ from focgen.logs.between import Between
 from focgen.rig import linear
 from focgen.rig.dynamics import SAME, Lever
 from focgen.rig.effects import Run
+from focgen.rig.turns import Act, by_turns, in_a_row
 
 _TURNS = 40
 _FEW = 4  # where hypotheses are only ranked
@@ -37,18 +36,11 @@ def levered(steps: Sequence[Any], lever: Lever) -> list[Any]:
     return [((lever, *(key for key, *_ in steps)), _driven([act for _, act, _ in steps], lever), None)]
 
 
-def _driven(acts: Sequence[Callable[[Array, Run], Array]], lever: Lever) -> Callable[[Array, Run], Array]:
-    def nominal(x: Array, run: Run) -> Array:
-        for act in acts:
-            x = act(x, run)
-        return x
+def _driven(acts: Sequence[Act], lever: Lever) -> Act:
+    nominal = in_a_row(acts)
 
     def respond(x: Array, run: Run) -> Array:
-        y = nominal(x, run)
-        for _ in range(_FEW if run.rough else _TURNS):
-            before, y = y, nominal(x * lever.strength(y), run)
-            if np.max(np.abs(y - before)) <= _CLOSE * np.max(np.abs(y)):
-                break
-        return y
+        turns = _FEW if run.rough else _TURNS
+        return by_turns(nominal(x, run), lambda y: nominal(x * lever.strength(y), run), turns, _CLOSE)
 
     return respond

@@ -7,13 +7,14 @@ is missing falls by the part 1 − s each time.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Hashable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
 
 from focgen.arrays import Array
 from focgen.rig.effects import Run
+from focgen.rig.turns import Act, by_turns, in_a_row
 
 _TURNS = 12
 _FEW = 3  # where hypotheses are only ranked: a spring that bears four fifths is then within 2e-3
@@ -43,21 +44,14 @@ def weakened(steps: Sequence[Any], weak: Sequence[Any], gain: float) -> list[Any
     return [(keys, _bent([act for _, act, _ in steps], weak, gain), None), *kept]
 
 
-def _bent(
-    acts: Sequence[Callable[[Array, Run], Array]], weak: Sequence[Weak], gain: float
-) -> Callable[[Array, Run], Array]:
-    def nominal(x: Array, run: Run) -> Array:
-        for act in acts:
-            x = act(x, run)
-        return x
+def _bent(acts: Sequence[Act], weak: Sequence[Weak], gain: float) -> Act:
+    nominal = in_a_row(acts)
 
     def respond(x: Array, run: Run) -> Array:
-        y = nominal(x, run)
-        for _ in range(_FEW if run.rough else _TURNS):
-            before, y = y, nominal(x + (1.0 - stiffness(y, weak, run)) * y / gain, run)
-            if np.max(np.abs(y - before)) <= _CLOSE * np.max(np.abs(y)):
-                break
-        return y
+        def further(y: Array) -> Array:
+            return nominal(x + (1.0 - stiffness(y, weak, run)) * y / gain, run)
+
+        return by_turns(nominal(x, run), further, _FEW if run.rough else _TURNS, _CLOSE)
 
     return respond
 

@@ -1,0 +1,33 @@
+"""Steps whose input depends on their own response: that is put in as it was found last, turn by turn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from focgen.arrays import Array
+from focgen.rig.effects import Run
+
+Act = Callable[[Array, Run], Array]
+
+
+def in_a_row(acts: Sequence[Act]) -> Act:
+    """One step after the other."""
+
+    def act(x: Array, run: Run) -> Array:
+        for each in acts:
+            x = each(x, run)
+        return x
+
+    return act
+
+
+def by_turns(y: Array, again: Callable[[Array], Array], turns: int, close: float) -> Array:
+    """The response (n,) that ``again`` makes of itself, from ``y``: after so many ``turns``, or once a turn
+    changes no more than ``close`` of the largest."""
+    for _ in range(turns):
+        before, y = y, again(y)
+        if np.max(np.abs(y - before)) <= close * np.max(np.abs(y)):
+            break
+    return y
