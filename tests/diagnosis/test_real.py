@@ -80,7 +80,8 @@ def rig_and_log(name: str, folder: Path):
     file, text = RIGS[name]
     if not (OPEN / file).exists():
         pytest.skip(f"the open data ({file}) are not here")
-    (folder / "rig.toml").write_text(f'name = "{name}"\n{text}')
+    named = text if text.lstrip().startswith("name") else f'name = "{name}"\n{text}'
+    (folder / "rig.toml").write_text(named)
     return folder / "rig.toml", OPEN / file
 
 
@@ -108,9 +109,10 @@ def diagnosed(name, folder, **options):
 
 @pytest.mark.long
 def test_friction_damper_has_hysteresis(tmp_path):
-    """Dry friction: one stage, so where it sits is inferred; it explains more than four fifths of the gap."""
+    """Dry friction: one stage, so where it sits is inferred; it explains more than four fifths of the gap. A
+    loop behind the dynamics may as well be the reading's: nothing logged stands between."""
     found = diagnosed("damper", tmp_path)
-    assert names(found)[0] == {"hysteresis"} and found.shrink > 0.8
+    assert names(found) == [{"hysteresis", "sensor_hysteresis"}] and found.shrink > 0.8
     assert found.where.inferred
 
 

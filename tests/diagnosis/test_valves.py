@@ -119,8 +119,13 @@ def test_where_a_valve_lay_is_asked_only_of_logs_that_begin_in_use():
 @pytest.mark.long
 @pytest.mark.parametrize("band, left", [(4.5, 1.5), (2.5, 2.5)])
 def test_a_valve_that_sticks_is_named_among_all_effects(band, left):
+    """One that slips to where its band ends is a play as well, and both are in the set."""
     found = diagnose(RIG, [loop(3, band, left, count=2000)], pictures=False)
-    assert found.verdict in ("named", "set") and found.causes[0].candidates[0].effect == "valve_stiction"
+    assert found.verdict in ("named", "set")
+    first, *others = [c.effect for c in found.causes[0].candidates]
+    assert first == "valve_stiction" or (
+        band == left and first == "hysteresis" and "valve_stiction" in others
+    )
 
 
 @pytest.mark.long
