@@ -12,13 +12,13 @@ from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
 from focgen.present import present
 from focgen.rig import chamber, lags, linear, uneven
-from focgen.rig import lever as levers
 from focgen.rig import plant as plants
 from focgen.rig.begun import past_of, with_past
 from focgen.rig.changeable import IN_STEPS
 from focgen.rig.delay import delayed
 from focgen.rig.dynamics import FREE, SAME, STEADY, UNCHANGED, Dynamics, Lever, Pace
 from focgen.rig.effects import EQUATIONS, SLOTS, Form, Run, library
+from focgen.rig.lever import levered
 from focgen.rig.modes import respond
 from focgen.rig.rig import UNITY, Actuator, LinearActuator, Rig
 from focgen.rig.weak import weakened
@@ -282,10 +282,16 @@ def _levered(
     between: Between | bool,
 ) -> list[Step]:
     if lever == SAME or dynamics != UNCHANGED:
-        return levers.levered(steps, lever)
+        return levered(steps, lever)
     of = actuator.dynamics
     between = between if isinstance(actuator, LinearActuator) else Between.STRAIGHT
-    return [((of, lever, between), lambda x, run: levers.run(of, x, run, lever, between), None)]
+    return [
+        (
+            (of, lever, between),
+            lambda x, run: linear.run_levered(of, x, run.rest, run.h, run.duration, between, lever),
+            None,
+        )
+    ]
 
 
 def _linear(

@@ -50,8 +50,8 @@ static void undisturbed(int n, const double *x, double *y, const unsigned char *
 /* focgen_modes where an obstacle, friction or two paces come in. In `z`, too, b1_i x[k] is left out until the next sample: the sum then
  * says what the output is without the present input, which stands for itself. */
 static void disturbed(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a, const double *b0,
-                             const double *b1, const double *pair, double through, int switching, double place, double stiffness,
-                             double slide, double stick, double *z)
+                      const double *b1, const double *pair, double through, int switching, double place, double stiffness,
+                      double slide, double stick, double *z)
 {
     double zr = 0.0, zi = 0.0, past = 0.0, last = 0.0, at_once[2] = {through, through};
     const double *lately = b1;

@@ -44,15 +44,10 @@ void focgen_levered_modes(int n, const double *x, double *y, const unsigned char
             settle(m, a, b0, b1, past, z);
             zr = gr * past, zi = gi * past;
         }
-        double still = pair[0] * zr - pair[1] * zi + pair[2] * past;
-        for (int i = 0; i < m; i++) {
-            z[i] = a[i] * z[i] + b0[i] * past;
-            still += z[i];
-        }
+        double still = decay(m, a, b0, pair, past, zr, zi, z);
         last = y[k] = driven(lever, still, direct, x[k], last, &pull);
         double now = x[k] * pull;
-        for (int i = 0; i < m; i++) z[i] += b1[i] * now;
-        turn(pair, past, now, &zr, &zi);
+        enter(m, b1, pair, past, now, &zr, &zi, z);
         past = now;
     }
 }

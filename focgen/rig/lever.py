@@ -1,8 +1,8 @@
 """An actuator that is driven the more strongly, or the less, the further it has gone.
 
-T D^α y + y = x g(y) is the response to x g. Of a linear one g is solved for at every sample (``lever.c``).
-Where friction or another spring come in, g is taken at the y found last: what is missing falls at each turn
-by the part of y that g changes by.
+T D^α y + y = x g(y) is the response to x g. Of a linear one g is solved for at every sample
+(:func:`~focgen.rig.linear.run_levered`). Where friction or another spring come in, g is taken at the y found
+last: what is missing falls at each turn by the part of y that g changes by.
 """
 
 from __future__ import annotations
@@ -11,9 +11,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from focgen.arrays import Array
-from focgen.fractional.transfer import TransferFunction
-from focgen.logs.between import Between
-from focgen.rig import linear
 from focgen.rig.dynamics import SAME, Lever
 from focgen.rig.effects import Run
 from focgen.rig.turns import Act, by_turns, in_a_row
@@ -21,11 +18,6 @@ from focgen.rig.turns import Act, by_turns, in_a_row
 _TURNS = 40
 _FEW = 4  # where hypotheses are only ranked
 _CLOSE = 1e-8  # of the largest response: what a turn may still change
-
-
-def run(transfer: TransferFunction, x: Array, run: Run, lever: Lever, between: Between | bool) -> Array:
-    """The response (n,) of a linear stage."""
-    return linear.run_levered(transfer, x, run.rest, run.h, run.duration, between, lever)
 
 
 def levered(steps: Sequence[Any], lever: Lever) -> list[Any]:

@@ -158,6 +158,11 @@ def is_spring(transfer: TransferFunction) -> bool:
     return holds_level(transfer) and transfer.is_integer
 
 
+def _in_lines(x: Array, rest: Bytes, between: Between | bool) -> Array:
+    """The input (n,) for loops that take it in straight lines: a smooth one with its bends sharpened."""
+    return sharpened(np.ascontiguousarray(x, float), rest) if between == Between.SMOOTH else x
+
+
 def run_bent(
     transfer: TransferFunction,
     x: Array,
@@ -169,8 +174,7 @@ def run_bent(
 ) -> Array:
     """As :func:`run` of a plant :func:`is_spring` whose spring follows ``dynamics``; the response counts as
     linear between samples, and the delay is exact in whole samples only."""
-    if between == Between.SMOOTH:
-        x = sharpened(np.ascontiguousarray(x, float), rest)
+    x = _in_lines(x, rest, between)
     b, a = _discrete(transfer, h, between == Between.HELD)
     c, _ = _discrete(transfer, h, False)
     made = kernels.bent_rational(x, rest, b, c, a, dynamics.bending(transfer.dc_gain))
@@ -187,23 +191,15 @@ def run_paced(
     slowness: kernels.Slowness,
 ) -> Array:
     """As :func:`run` of a stage that :func:`holds_level`, at its fastest, whose pace ``slowness`` tells."""
-    if between == Between.SMOOTH:
-        x = sharpened(np.ascontiguousarray(x, float), rest)
+    x = _in_lines(x, rest, between)
     if transfer.is_integer:
         b, a = _discrete(transfer, h, between == Between.HELD)
         c, _ = _discrete(transfer, h, False)
         return kernels.paced_rational(x, rest, b, c, a, slowness)
-    lag, longest = single_lag(transfer), about_as_long(duration)
-    if lag:
-        gain, T, alpha = lag
-        by, (_, *pace), share = slowness
-        a, b0, b1, pair, through = tables(T, alpha, h, longest, 1.0)
-        unit = by, (1.0, *pace), share
-        made = kernels.paced_modes(x, rest, a[0], b0[0], b1[0], pair[0], through, unit)
-        return gain * settled(made, x, rest, 1.0 - fractional_lag(T, alpha, h, longest).gain)
-    (a, b0, b1), pair, through = _tables(transfer, h, longest)
-    made = kernels.paced_modes(x, rest, a[0], b0[0], b1[0], pair[0], through, slowness)
-    return settled(made, x, rest, _missing(transfer, _fractional(transfer, h, longest)))
+    gain, row, missing = _row(transfer, h, about_as_long(duration))
+    by, (own, *pace), share = slowness
+    made = kernels.paced_modes(x, rest, *row, (by, (own / gain, *pace), share))
+    return gain * settled(made, x, rest, missing)
 
 
 def run_levered(
@@ -216,23 +212,30 @@ def run_levered(
     lever: Lever,
 ) -> Array:
     """As :func:`run` of a stage that :func:`holds_level`, whose input pulls as strongly as ``lever`` says."""
-    if between == Between.SMOOTH:
-        x = sharpened(np.ascontiguousarray(x, float), rest)
-    own = lever.first, lever.second, lever.scale
+    x = _in_lines(x, rest, between)
     if transfer.is_integer:
+        own = lever.first, lever.second, lever.scale
         return kernels.levered_rational(x, rest, *_discrete(transfer, h, between == Between.HELD), own)
-    lag, longest = single_lag(transfer), about_as_long(duration)
+    gain, row, missing = _row(transfer, h, about_as_long(duration))
+    made = gain * kernels.levered_modes(x, rest, *row, (lever.first, lever.second, lever.scale / gain))
+    return settled(made, x * lever.strength(made), rest, gain * missing)
+
+
+def _row(
+    transfer: TransferFunction, h: float, duration: float
+) -> tuple[float, tuple[Array, Array, Array, Array, float], float]:
+    """What multiplies the response of the modes, the one row of them that a compiled loop needs, and the gain
+    at rest that they lack."""
+    lag = single_lag(transfer)
     if lag:
         gain, T, alpha = lag
-        a, b0, b1, pair, through = tables(T, alpha, h, longest, 1.0)
-        unit = lever.first, lever.second, lever.scale / gain
-        made = gain * kernels.levered_modes(x, rest, a[0], b0[0], b1[0], pair[0], through, unit)
-        missing = gain * (1.0 - fractional_lag(T, alpha, h, longest).gain)
+        a, b0, b1, pair, through = tables(T, alpha, h, duration, 1.0)
+        missing = 1.0 - fractional_lag(T, alpha, h, duration).gain
     else:
-        (a, b0, b1), pair, through = _tables(transfer, h, longest)
-        made = kernels.levered_modes(x, rest, a[0], b0[0], b1[0], pair[0], through, own)
-        missing = _missing(transfer, _fractional(transfer, h, longest))
-    return settled(made, x * lever.strength(made), rest, missing)
+        gain = 1.0
+        (a, b0, b1), pair, through = _tables(transfer, h, duration)
+        missing = _missing(transfer, _fractional(transfer, h, duration))
+    return gain, (a[0], b0[0], b1[0], pair[0], through), missing
 
 
 def oscillator(x: Array, rest: Bytes, h: float, period: float, damping: float, speed: bool = False) -> Array:

@@ -24,3 +24,21 @@ static void turn(const double *pair, double past, double now, double *re, double
     *im = pair[0] * *im + pair[1] * *re + pair[3] * past + pair[5] * now;
     *re = on;
 }
+
+/* The modes one sample on without the present input; returns what the response is without it. */
+static inline double decay(int m, const double *a, const double *b0, const double *pair, double past, double re, double im, double *z)
+{
+    double still = pair[0] * re - pair[1] * im + pair[2] * past;
+    for (int i = 0; i < m; i++) {
+        z[i] = a[i] * z[i] + b0[i] * past;
+        still += z[i];
+    }
+    return still;
+}
+
+/* The present input enters the modes and the pair. */
+static inline void enter(int m, const double *b1, const double *pair, double past, double now, double *re, double *im, double *z)
+{
+    for (int i = 0; i < m; i++) z[i] += b1[i] * now;
+    turn(pair, past, now, re, im);
+}

@@ -48,16 +48,11 @@ void focgen_paced_modes(int n, const double *x, double *y, const unsigned char *
             settle(m, a, b0, b1, past, z);
             zr = gr * past, zi = gi * past;
         }
-        double still = pair[0] * zr - pair[1] * zi + pair[2] * past;
-        for (int i = 0; i < m; i++) {
-            z[i] = a[i] * z[i] + b0[i] * past;
-            still += z[i];
-        }
+        double still = decay(m, a, b0, pair, past, zr, zi, z);
         if (!by) w = share[k];
         last = y[k] = paced(by, pace, still, direct, direct, x[k], last, &w);
         double now = x[k] * w + last / pace[0] * (1.0 - w);
-        for (int i = 0; i < m; i++) z[i] += b1[i] * now;
-        turn(pair, past, now, &zr, &zi);
+        enter(m, b1, pair, past, now, &zr, &zi, z);
         past = now;
     }
 }

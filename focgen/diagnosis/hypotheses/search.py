@@ -280,15 +280,18 @@ def raced(tried: Sequence[Fit], weighing: Weighing, iterations: int, tolerance: 
     """Each fitted further, the most promising first; one that falls behind is left there. On all cores those
     behind the first, where a run takes long."""
 
-    def further(of: Fit, problem: Problem, leader: Fit | None) -> Fit:
-        return fit(problem, of.vector, weighing, iterations, tolerance, leader=leader)
+    def on(of: Fit, leader: Fit | None) -> Fit:
+        return fit(of.problem, of.vector, weighing, iterations, tolerance, leader=leader)
 
-    found: list[Fit] = []
     ordered = sorted(tried, key=lambda t: t.sse)
-    abroad = ordered[1:] if ordered and _in_steps(ordered[0].problem) else []
-    for t in ordered[: len(ordered) - len(abroad)]:
-        found.append(further(t, t.problem, min(found, key=lambda f: f.cost, default=None)))
-    return found + abreast(lambda t: further(t, replace(t.problem, memory={}), found[0]), abroad)
+    if ordered and _in_steps(ordered[0].problem):
+        first = on(ordered[0], None)
+        apart = [replace(t, problem=replace(t.problem, memory={})) for t in ordered[1:]]
+        return [first, *abreast(lambda t: on(t, first), apart)]
+    found: list[Fit] = []
+    for t in ordered:
+        found.append(on(t, min(found, key=lambda f: f.cost, default=None)))
+    return found
 
 
 def _likeliest(problem: Problem, at: Footing, starts: Sequence[np.ndarray]) -> list[np.ndarray]:
