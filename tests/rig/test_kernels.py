@@ -69,6 +69,24 @@ def test_modes_are_the_sum_of_each(m, changed):
     np.testing.assert_allclose(made, exact, atol=1e-12 * np.max(np.abs(exact)))
 
 
+@pytest.mark.parametrize(
+    "changed", [{"switching": True}, {"place": 0.3, "stiffness": 2.0}], ids=["two paces", "obstacle"]
+)
+def test_modes_in_equilibrium_are_those_of_a_long_hold(changed):
+    rng, held, own = np.random.default_rng(7), 20_000, FREE | {"switching": False} | changed
+    x = 1.0 + 0.5 * np.sin(0.03 * np.arange(600))
+    rows = (Row(rng, 7, 1.0), Row(rng, 7, 3.0))
+    tables = [np.array([getattr(row, name) for row in rows]) for name in ("a", "b0", "b1")]
+    begins = np.zeros(600, np.uint8)
+    begins[0] = kernels.BALANCED
+    made = kernels.modes(x, begins, *tables, np.zeros((2, 6)), 0.05, **own)
+    long = np.r_[np.full(held, x[0]), x]
+    first = np.zeros(len(long), np.uint8)
+    first[0] = 1
+    exact = kernels.modes(long, first, *tables, np.zeros((2, 6)), 0.05, **own)[held:]
+    np.testing.assert_allclose(made, exact, atol=1e-9)
+
+
 @pytest.mark.parametrize(("k", "known"), [(1, 0), (6, 0), (9, 5), (13, 12)])
 def test_products_of_few_rows_or_many_known_or_not(k, known):
     rows = np.random.default_rng(k).standard_normal((k, 2100))
@@ -78,7 +96,9 @@ def test_products_of_few_rows_or_many_known_or_not(k, known):
 
 
 @pytest.mark.parametrize("coarse", [1, 4])
-@pytest.mark.parametrize("ar", [[1.0], [1.0, -0.6, 0.2]], ids=["white", "coloured"])
+@pytest.mark.parametrize(
+    "ar", [[1.0], [1.0, -0.6, 0.2], [1.0, *0.6 ** np.arange(1, 10)]], ids=["white", "coloured", "of order 9"]
+)
 def test_innovations_and_what_they_are_more_than_others(coarse, ar):
     rng, n = np.random.default_rng(coarse), 3001
     y, made, weight = rng.standard_normal((3, n))
