@@ -8,7 +8,9 @@ largest.
 *Surviving gap*: what is left of it, in the logged signals, once the nominal parameters of the rig have been
 refitted: the projection off their sensitivities. Those of the actuator (T, alpha, gain or num and den,
 offset, the zero of an integrating one's drive) move freely, gain and times of regulator and sensor by three
-times their uncertainty. Each signal is weighted by its noise. *Visible*: in at least one logged signal the
+times their uncertainty. Every column may be out of step by half a sample, and read half a per cent of its
+span more or less from one experiment to the next, as loggers and gauges are. Each signal is weighted by its
+noise. *Visible*: in at least one logged signal the
 surviving gap is 0.3 of the noise or more, both root mean square.
 """
 
@@ -31,6 +33,8 @@ from focgen.trials.machine import Machine, Session, Setting
 SEVERITIES = {"low": 0.03, "mid": 0.08, "high": 0.20}
 VISIBLE = 0.3
 _USUAL = 3.0  # times the uncertainty of what was given: as far off is no fault
+_OUT_OF_STEP = 0.5  # of a sample: what a logger leaves open
+_ZERO = 0.005  # of a span: what the zero of a gauge differs by from one experiment to the next
 _SIGNAL_OF = {"regulator": "pressure", "actuator": "curvature", "sensor": "output"}
 
 
@@ -89,14 +93,32 @@ def surviving(rig: Rig, trial: Trial, gap: Mapping[str, Array], noise: dict[str,
     ``gap`` and ``noise`` (rms) carry the logged signals only.
     """
     base = trial.signals(rig)
-    moves = [*((*move, np.inf) for move in moved_rigs(rig)), *_scaled_rigs(rig)]
-    columns = [
-        _stacked({n: (trial.signals(other)[n] - base[n]) / step for n in gap}, noise)
-        for other, step, _ in moves
+    ways: list[tuple[dict[str, Array], float]] = [
+        ({n: (trial.signals(other)[n] - base[n]) / step for n in gap}, most)
+        for other, step, most in (*((*move, np.inf) for move in moved_rigs(rig)), *_scaled_rigs(rig))
     ]
+    ways += _logged_otherwise({n: base[n] for n in gap}, trial, rig.sample_time)
+    columns = np.stack([_stacked(way, noise) for way, _ in ways], axis=1)
     target = _stacked(gap, noise)
-    rest = target - _refitted(np.stack(columns, axis=1), np.array([most for *_, most in moves]), target)
+    rest = target - _refitted(columns, np.array([most for _, most in ways]), target)
     return {name: rms(part) for name, part in zip(gap, np.split(rest, len(gap)))}
+
+
+def _logged_otherwise(
+    signals: Mapping[str, Array], trial: Trial, Ts: float
+) -> Iterator[tuple[dict[str, Array], float]]:
+    """What a column a sample late, and another zero of a gauge in one experiment, change of the ``signals``
+    (n,), and how many times that they may do so."""
+    ends = np.cumsum([len(command) for command in trial.commands])
+    for name, values in signals.items():
+        bare = {other: np.zeros_like(values) for other in signals}
+        parts = np.split(values, ends[:-1])
+        late = np.concatenate([-np.gradient(part, trial.h) * Ts for part in parts])
+        yield bare | {name: late}, _OUT_OF_STEP
+        for end, part in zip(ends, parts):
+            zero = np.zeros_like(values)
+            zero[end - len(part) : end] = np.ptp(values)
+            yield bare | {name: zero}, _ZERO
 
 
 def _refitted(columns: Array, most: Array, target: Array) -> Array:
