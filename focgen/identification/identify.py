@@ -33,11 +33,11 @@ from focgen.logs.rates import at_one_rate
 from focgen.logs.read import Logs, digest_of, each_of, read_logs
 from focgen.output import check_apart, write_file
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
-from focgen.rig.engine import STAGES
 from focgen.rig.files import check_replaces_rig, rig_text
 from focgen.rig.plausibility import doubts
 from focgen.rig.response import check_bounded, longest
 from focgen.rig.rig import Actuator, Rig
+from focgen.rig.stages import STAGES
 
 Quality = dict[str, dict[str, float]]
 _COMPROMISE = (

@@ -23,8 +23,9 @@ from focgen.loop.frequency import LOW, any_schedule, chain_transfer, held_respon
 from focgen.loop.linear_effects import linear_part
 from focgen.plan.plan import Plan
 from focgen.plan.response import running_gain, running_response
-from focgen.rig.corners import EXACT, STAGES, corners, moved, transfer_of, without_gain
+from focgen.rig.corners import EXACT, corners, moved, transfer_of, without_gain
 from focgen.rig.rig import Rig, Uncertainty
+from focgen.rig.stages import STAGES
 
 Simulated = Callable[[Rig], Sequence[StepMeasures | None]]
 """The steps to the set points on a rig, None for those that are left out."""

@@ -9,8 +9,8 @@ from itertools import product
 
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig.rig import UNITY, Actuator, Delays, LinearActuator, Relative, Rig, Uncertainty
+from focgen.rig.stages import STAGES
 
-STAGES = ("regulator", "actuator", "sensor")
 EXACT = Uncertainty(Relative(0.0, 0.0), Relative(0.0, 0.0), Relative(0.0, 0.0))
 _ENDS = (-1.0, 1.0)
 

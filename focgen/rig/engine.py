@@ -21,9 +21,8 @@ from focgen.rig.effects import EQUATIONS, SLOTS, Form, Run, library
 from focgen.rig.lever import levered
 from focgen.rig.modes import respond
 from focgen.rig.rig import UNITY, Actuator, LinearActuator, Rig
+from focgen.rig.stages import STAGES
 from focgen.rig.weak import weakened
-
-STAGES = ("regulator", "actuator", "sensor")
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,8 @@
 
 The state is told by what the input was before the first sample. Tried are, from the simplest on: a rest at
 0; the first level held for ever; a step to it from rest at 0, at an unknown time; the same from an unknown
-level; two steps from rest. A further unknown has to earn its place (Schwarz's criterion, on as many samples
+level; two steps from rest. A signal further on is tried as well with what the pasts of those ahead of it, as
+told so far, make of it. A further unknown has to earn its place (Schwarz's criterion, on as many samples
 as the residual's correlation leaves). And none is tried where the first samples are those of a rig at rest:
 there it cannot have moved yet, whatever its parameters are, so that a past shows, and a misfit does not.
 But an input that rests a little off 0 was held there, where the rig shows no step to it. At an input of 0 an
@@ -11,7 +12,7 @@ offset holds a rig off as a past does, but no larger one than what is left for g
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -21,14 +22,14 @@ from focgen.arrays import Array
 from focgen.logs.begin import REST, Begin
 from focgen.logs.between import white_level
 from focgen.logs.experiment import Experiment
+from focgen.rig.carried import carried, stretched
 from focgen.rig.effects import Run
-from focgen.rig.engine import STAGES, Chain, Placed, between_of
+from focgen.rig.engine import Chain, Placed, between_of
 from focgen.rig.response import response_time
 from focgen.rig.rig import LinearActuator, Rig
+from focgen.rig.stages import ENTERS, LEAVES, STAGES
 
 NOTE = "begins away from rest: the state that it starts from is estimated"
-ENTERS = {"command": "regulator", "pressure": "actuator", "curvature": "sensor"}
-LEAVES = {"regulator": "pressure", "actuator": "curvature", "sensor": "output"}
 _ROLES = ("command", "pressure", "curvature", "output")
 _SEEN = 40.0  # response times from the beginning that are looked at,
 _LEAST = 200  # and samples
@@ -44,6 +45,7 @@ _OFFSET = 4.0  # times better than any past: then a rest with an offset of any s
 _NOTHING = 0.06  # of the input's largest magnitude: what counts as 0
 _LITTLE = 0.01  # of it: less, held before a log, does not show
 _BEYOND = 0.2  # of it: by so much earlier levels may leave the input's range
+_TIMES_AS_FAR = (0.5, 2.0)  # a past that another signal's made may be from where the log begins
 _SHOWN = 0.3  # of a response time at 0: what is shorter shows no decay
 _FORGOTTEN = 5.0  # response times after which the past shows no more,
 _MOSTLY = 0.9  # of what is left from there on an offset may be: a signal that comes back to 0 has none
@@ -127,7 +129,11 @@ def _begun(
         return log
     if len(log) < 2 * _FIRST or not all(np.all(np.isfinite(log[role])) for role in scales.sizes):
         return log
-    found = {entry: _Setting(rig, log, entry, placed, scales).chosen() for entry in entries}
+    found: dict[str, Begin] = {}
+    for entry in entries:
+        setting = _Setting(rig, log, entry, placed, scales)
+        told = [setting.told_by(ahead, begin) for ahead, begin in found.items() if begin.ago]
+        found[entry] = setting.chosen([t for tries in told for t in tries])
     found = {entry: begin for entry, begin in found.items() if not begin.at_rest}
     notes = tuple(note for note in log.notes if note != NOTE)
     return replace(log, begins=found, notes=(*notes, NOTE) if found else notes)
@@ -174,6 +180,7 @@ class _Setting:
         self.longest = max(_LONGEST * pace, 20.0 * self.h)
         self.roles = scales.behind(entry)
         self.stages = ENTERS[entry], list(self.roles)[-1]
+        self.log = log
         self.x, self.start = np.asarray(log[entry], float)[:n], log.start
         self.units = [scales.sizes[r] for r in self.roles.values()]
         measured = (np.asarray(log[role], float)[:n] for role in self.roles.values())
@@ -223,8 +230,18 @@ class _Setting:
         made: Array = (raw - np.clip(mean, -offset, offset)) * self.counts
         return made
 
-    def chosen(self) -> Begin:
-        """The begin that the data ask for."""
+    def told_by(self, ahead: str, begin: Begin) -> Iterator[_Try]:
+        """The past that the signal ``ahead`` makes of the input, where that one's is ``begin``: as it is, and
+        so many times as far from where the log begins as suits best."""
+        leaves = STAGES[STAGES.index(ENTERS[self.entry]) - 1]
+        base = self.at(carried(self.chain, self.log, ahead, begin, leaves), 0)
+        toward = self.at(stretched(base.begin, 2.0), 0).left - base.left
+        times = 1.0 - float(np.sum(toward * base.left)) / max(float(np.sum(toward**2)), 1e-300)
+        yield base
+        yield self.at(stretched(base.begin, float(np.clip(times, *_TIMES_AS_FAR))), 1)
+
+    def chosen(self, further: Sequence[_Try] = ()) -> Begin:
+        """The begin that the data ask for, of all kinds and the ``further`` ones."""
         rest, asked = self.at(REST, 0), self.asked
         noise = np.array([_white(y) for y in self.y.T])
         moved = rest.first > np.maximum(_APART * noise / np.sqrt(_FIRST), asked.off)
@@ -235,7 +252,7 @@ class _Setting:
             return float(np.linalg.norm(t.first[moved]) / np.linalg.norm(rest.first[moved]))
 
         most = asked.cost * rest.cost
-        tries = [t for t in self.tries() if off(t) < asked.mended and t.cost < most]
+        tries = [t for t in (*further, *self.tries()) if off(t) < asked.mended and t.cost < most]
         if not tries:
             return REST
         sure = np.max(rest.first) > asked.far and min(map(off, tries)) < asked.surely

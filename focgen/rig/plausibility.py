@@ -15,8 +15,9 @@ from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
 from focgen.logs.plausibility import Link, Signals
 from focgen.rig.effects import Run
-from focgen.rig.engine import STAGES, Chain, between_of
+from focgen.rig.engine import Chain, between_of
 from focgen.rig.rig import UNITY, Rig
+from focgen.rig.stages import STAGES
 
 _ROLES = ("command", "pressure", "curvature", "output")  # before each stage, and after the last
 _MOST = 40_000  # samples are enough to tell a unit

@@ -21,12 +21,12 @@ import numpy as np
 from focgen.arrays import Array, Bools
 from focgen.logs.begin import Begin
 from focgen.logs.experiment import Experiment
-from focgen.rig.engine import STAGES, Chain, Placed, between_of
-from focgen.rig.initial import ENTERS, LEAVES
+from focgen.rig.engine import Chain, Placed, between_of
 from focgen.rig.initial import NOTE as ESTIMATED
 from focgen.rig.response import integrations, longest, response_time
 from focgen.rig.rig import Rig
 from focgen.rig.session import joined, run_of
+from focgen.rig.stages import ENTERS, LEAVES, STAGES
 
 NOTE = "begins before the rig has come to rest: the experiments before are simulated ahead of it"
 _RECALLED = 0.98  # of the mean square that is left without: more is no sign that the rig remembers

@@ -21,16 +21,16 @@ from focgen.logs.still import check_moving
 from focgen.logs.table import LARGEST
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.effects import Parameter, library
-from focgen.rig.engine import STAGES, Chain, Placed, between_of
+from focgen.rig.engine import Chain, Placed, between_of
 from focgen.rig.initial import begun
 from focgen.rig.plausibility import doubts
 from focgen.rig.recalled import with_recalled
 from focgen.rig.response import check_bounded, longest
 from focgen.rig.rig import Rig
 from focgen.rig.session import joined, run_of
+from focgen.rig.stages import LEAVES, STAGES
 from focgen.shown import Shown
 
-_LEAVES = {"regulator": "pressure", "actuator": "curvature", "sensor": "output"}
 _CLOSER = (
     0.05  # of the mean square that a held command leaves: less, and another way is what the command does
 )
@@ -129,7 +129,7 @@ def simulate_session(
     first = "regulator" if entry == "command" else "actuator"
     chain = Chain(rig, tuple(placed_in(rig) if placed is None else placed))
     chain.run(x, first, "sensor", run, between_of(rig, entry), tap)
-    return [{_LEAVES[stage]: y[a:b] for stage, y in tap.items()} for a, b in run.spans]
+    return [{LEAVES[stage]: y[a:b] for stage, y in tap.items()} for a, b in run.spans]
 
 
 def told_between(rig: Rig, logs: Sequence[Experiment]) -> Rig:

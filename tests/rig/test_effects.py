@@ -13,10 +13,11 @@ import focgen
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig import plant
 from focgen.rig.dynamics import UNCHANGED
-from focgen.rig.effects import EQUATIONS, SLOTS, STAGES, Excitation, Run, form_of, library
+from focgen.rig.effects import EQUATIONS, SLOTS, Excitation, Run, form_of, library
 from focgen.rig.engine import Chain, Placed, slot_in
 from focgen.rig.plant import Plant
 from focgen.rig.rig import Actuator, Rig, Signals
+from focgen.rig.stages import STAGES
 
 NAMES = sorted(library())
 RICH = Excitation(10, 0.1, 20, 20, 100.0, 0.01, 8, 5, 5, 500.0, 100.0)

@@ -19,6 +19,7 @@ from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.problem.segments import Segment, cuts, make
 from focgen.logs.begin import REST, Begin
 from focgen.logs.experiment import Experiment
+from focgen.rig.carried import stretched
 from focgen.rig.effects import Run
 from focgen.rig.engine import Chain, Placed
 from focgen.rig.initial import begun
@@ -121,7 +122,12 @@ def _rested(log: Experiment, earlier: Sequence[Experiment], role: str, past: flo
 
 
 def _beside(begin: Begin, step: float) -> Iterator[Begin]:
-    """The begin with each of its numbers a standard deviation off."""
+    """The begin with each of its numbers a standard deviation off. One that another signal's past made has
+    two: how far the signal was from where it is, and how long ago."""
+    if begin.carried:
+        yield stretched(begin, _TIME)
+        yield replace(begin, ago=tuple(t * _TIME for t in begin.ago))
+        return
     for k in range(len(begin.levels)):
         yield replace(begin, levels=tuple(v + step * (i == k) for i, v in enumerate(begin.levels)))
     for k in range(len(begin.ago)):

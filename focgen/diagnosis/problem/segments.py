@@ -14,9 +14,8 @@ from focgen.rig import kernels
 from focgen.rig.effects import Run
 from focgen.rig.rig import UNITY, Rig
 from focgen.rig.session import joined, run_of
+from focgen.rig.stages import ENTERS, LEAVES, STAGES
 
-_ENTERS = {"command": "regulator", "pressure": "actuator", "curvature": "sensor"}
-_LEAVES = {"pressure": "regulator", "curvature": "actuator", "output": "sensor"}
 _TIMING = 0.3  # of a sample: what loggers leave open
 _FOLLOWED = 0.3  # correlation of an output with the reference that leads it
 _EITHER = 0.1  # of the larger side at least: then a signal goes both ways
@@ -145,8 +144,8 @@ def cuts(logs: Sequence[Experiment]) -> tuple[str, ...]:
 
 def between(entry: str, exit: str) -> tuple[str, ...]:
     """The stages between two signals."""
-    order = ("regulator", "actuator", "sensor")
-    return order[order.index(_ENTERS[entry]) : order.index(_LEAVES[exit]) + 1]
+    last = next(stage for stage in STAGES if LEAVES[stage] == exit)
+    return STAGES[STAGES.index(ENTERS[entry]) : STAGES.index(last) + 1]
 
 
 def make(

@@ -14,9 +14,9 @@ from focgen.report.figures import Axis, Bars, Figure, Line, Panel, Rule, curve
 from focgen.report.page import Section, TableOf
 from focgen.report.pages.parts import curves_table, notes, number, warnings
 from focgen.report.style import CYCLE, with_unit
-from focgen.rig.engine import STAGES
 from focgen.rig.replay import Replay, simulate_session
 from focgen.rig.rig import Actuator, Rig
+from focgen.rig.stages import STAGES
 
 _STEPS, _SAMPLES = 5, 600  # what a rig is shown by
 _TIME = Axis("time (s)")

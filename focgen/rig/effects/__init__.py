@@ -16,7 +16,6 @@ from typing import NoReturn
 from focgen.rig.effects._effect import (
     EQUATIONS,
     SLOTS,
-    STAGES,
     STEP,
     Effect,
     Excitation,
@@ -28,7 +27,6 @@ from focgen.rig.effects._effect import (
 __all__ = [
     "EQUATIONS",
     "SLOTS",
-    "STAGES",
     "STEP",
     "Effect",
     "Excitation",

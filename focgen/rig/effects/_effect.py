@@ -17,7 +17,6 @@ from focgen.arrays import Array, Bytes, Complex
 from focgen.fractional.transfer import Polynomial
 from focgen.logs.begin import Begin
 
-STAGES = ("regulator", "actuator", "sensor")
 SLOTS = {
     "regulator": ("command", "chamber", "supply"),
     "actuator": ("load", "drive", "spring", "dynamics", "response", "place"),
