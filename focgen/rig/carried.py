@@ -32,7 +32,7 @@ def carried(chain: Chain, log: Experiment, entry: str, begin: Begin, last: str) 
     x = np.concatenate([past, np.asarray(log[entry], float)[:_FIRST]])
     made = chain.run(x, ENTERS[entry], last, run, between_of(chain.rig, entry))
     off = float(np.mean(np.asarray(log[LEAVES[last]], float)[:_FIRST] - made[-_FIRST:]))
-    means, ago = _in_windows(made[1 : len(past)] + off, log.sample_time)
+    means, ago = _in_windows(made[: len(past)] + off, log.sample_time)
     return Begin((float(made[0]), *means), ago, carried=True)
 
 

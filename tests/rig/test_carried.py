@@ -69,3 +69,15 @@ def test_it_ends_where_the_log_begins():
     past = Begin((0.0, 1.5, 0.0), (10.0, 2.0))
     ends = [carried(Chain(rig), log, "command", past, "actuator").levels[-1] for rig in (SLOW, weak)]
     assert ends == pytest.approx([log["curvature"][0]] * 2, rel=0.1)
+
+
+@pytest.mark.parametrize("ago", [0.5, 0.6, 1.5, 2.5])
+def test_a_step_as_the_log_begins_is_carried_too(ago):
+    told = carried(
+        Chain(SLOW), cut(signals(SLOW)[0], 300), "command", Begin((1.5, 0.0), (ago * H,)), "actuator"
+    )
+    forever = Chain(SLOW).run(
+        np.full(5, 1.5), "regulator", "actuator", Run.of([5], [0.0], H, [Begin((1.5,))])
+    )
+    assert told.levels[0] == pytest.approx(forever[0]) and len(told.ago) == len(told.levels) - 1 >= 1
+    assert np.all(np.diff(told.ago) < 0.0) and told.samples(H)[0] == pytest.approx(forever[0])
