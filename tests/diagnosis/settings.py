@@ -42,6 +42,7 @@ CONSTANTS = {
     "proposals/separation.py": ["_NOISIER"],
     "proposals/identifiability.py": ["ALIKE", "HIDDEN", "_FINE", "_LONGEST"],
     "proposals/limits.py": ["_BELOW", "_BEYOND", "_JUMP", "_LEAST", "_LONGEST", "_MARGIN"],
+    "verdict/clocks.py": ["_SETTLED"],
     "verdict/evidence.py": ["_STILL"],
     "verdict/moves.py": ["_SLACK"],
     "verdict/outside.py": ["_ASKED", "_BAND"],

@@ -11,17 +11,9 @@ from focgen.diagnosis.hypotheses.level_pace import paced_stage, slower_by
 from focgen.diagnosis.hypotheses.rivals import Cause
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.verdict.confidence import nominal_instead
-from focgen.diagnosis.verdict.late import logged_late
-from focgen.diagnosis.verdict.moments import Changed, another, changed_at_once
 from focgen.diagnosis.verdict.predicted_improvement import paths
-from focgen.diagnosis.verdict.summary import Summary
-from focgen.diagnosis.verdict.uneven import unevenly_paced
+from focgen.diagnosis.verdict.summary import Summary, doubts
 
-_AT = {
-    "level": "at its highest level as at 0",
-    "time": "at the session's end as at its begin",
-    "speed": "at its greatest speed as near rest",
-}
 _NEAR = 0.95  # of the error without any effect: with more a family is not near
 
 
@@ -39,20 +31,9 @@ def cautions(
             f"the {effect} wanders: followed through this session, its next turn cannot be "
             "predicted, and nothing of it is promised"
         )
-    for e in unknown:
-        if at_once := another(e):
-            yield f"{_within(e)}: not slowly, but at once it {_at_once(at_once)}"
     named = [e.whole or e for e, _ in causes]
-    for e in dict.fromkeys([*doubted, *named]):
-        if (at_once := changed_at_once(e)) and at_once.sure > 1.0 - NUMBERS.held:
-            families = " and ".join(sorted(at_once.instead))
-            yield (
-                f"{_within(e)}: instead of {families} it may be ({at_once.sure:.0%}) that at once it "
-                f"{_at_once(at_once)}"
-            )
-    asked = dict.fromkeys([*unknown, *doubted, *named])
-    yield from _late(asked)
-    yield from _uneven(asked)
+    for e in dict.fromkeys([*unknown, *doubted, *named]):
+        yield from _instead(e)
     yield from _nominal([*causes, *off])
     for e in unknown if causes else ():
         yield f"{_within(e)}: no effect explains what is left there{_nearest(e)}"
@@ -78,29 +59,13 @@ def _within(e: Explanation) -> str:
     return f"{e.segment.entry} to {e.segment.exit}"
 
 
-def _late(explanations: Iterable[Explanation]) -> Iterator[str]:
-    """Where the command may have been logged late instead of an effect."""
-    for e in explanations:
-        if (late := logged_late(e)) and late.sure > 1.0 - NUMBERS.held:
-            yield (
-                f"{_within(e)}: instead of {' and '.join(sorted(late.instead))} the command may be "
-                f"({late.sure:.0%}) logged {late.seconds:.3g} s late ({late.samples} samples); see to it "
-                "that each row has what was sent as the readings were taken"
-            )
-
-
-def _uneven(explanations: Iterable[Explanation]) -> Iterator[str]:
-    """Where a pace may be uneven instead of an effect, or explains what no effect does."""
-    for e in explanations:
-        if (pace := unevenly_paced(e)) and pace.sure > 1.0 - NUMBERS.held:
-            named = " and ".join(sorted(pace.instead))
-            instead = f"instead of {named}" if named else "beside no effect"
-            slower = pace.slowness >= 1.0
-            times = pace.slowness if slower else 1.0 / pace.slowness
-            yield (
-                f"{_within(e)}: {instead} the {pace.stage} may be ({pace.sure:.0%}) {times:.2g} times as "
-                f"{'slow' if slower else 'fast'} {_AT[pace.by]}, which no effect of the library is"
-            )
+def _instead(e: Explanation) -> Iterator[str]:
+    """What no effect is and may be there instead: of several things instead of one effect the likeliest."""
+    told = set[str]()
+    for other in sorted(filter(None, doubts(e)), key=lambda o: -o.odds):
+        if other.sure > 1.0 - NUMBERS.held and not (told and other.instead <= told):
+            told |= other.instead or {""}
+            yield f"{_within(e)}: {other.said}"
 
 
 def paced(explanations: Iterable[Explanation]) -> Iterator[str]:
@@ -137,15 +102,6 @@ def _nominal(causes: Sequence[tuple[Explanation, Cause]]) -> Iterator[str]:
                 f"{first.effect} changes, {first.change:.2g} of the noise; to tell, identify the rig from "
                 "logs of it as it should be"
             )
-
-
-def _at_once(changed: Changed) -> str:
-    """When it became another, by how much, and what to do about it."""
-    said = (
-        f"{m.within:.4g} s into {m.experiment} by {m.rms:.3g} (root mean square; on average {m.mean:+.3g})"
-        for m in changed.moments
-    )
-    return f"becomes another: {', '.join(said)}; diagnose the parts by themselves"
 
 
 def _nearest(e: Explanation) -> str:

@@ -165,7 +165,7 @@ def _found(
 
 def _lasting(e: Explanation, cause: Cause) -> float:
     """How likely a cause was there all along, and neither did the rig become another at once instead, nor was
-    the command logged late, nor a pace uneven."""
+    the command logged late, nor columns on clocks of their own, nor a pace uneven."""
     found = [f for f in doubts(e.whole or e) if f is not None]
     first = cause.rivals[0].effect
     return float(np.prod([1.0 - f.sure for f in found if first in f.instead]))

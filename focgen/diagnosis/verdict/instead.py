@@ -30,6 +30,17 @@ class Instead:
         """How likely it is, if it is that or what was found."""
         return sureness(self.odds)
 
+    @property
+    def said(self) -> str:
+        """What it is instead of, how likely, and what to do about it."""
+        named = f"instead of {' and '.join(sorted(self.instead))}" if self.instead else "beside no effect"
+        return f"{named} {self.may_be}"
+
+    @property
+    def may_be(self) -> str:
+        """What it is, how likely, and what to do about it."""
+        raise NotImplementedError
+
 
 def is_likelier(other: Instead | None) -> bool:
     """Whether it is likelier than what was found."""

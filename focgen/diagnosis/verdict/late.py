@@ -29,6 +29,14 @@ class Late(Instead):
     samples: int
     seconds: float
 
+    @property
+    def may_be(self) -> str:
+        """As of :class:`Instead`."""
+        return (
+            f"the command may be ({self.sure:.0%}) logged {self.seconds:.3g} s late ({self.samples} "
+            "samples); see to it that each row has what was sent as the readings were taken"
+        )
+
 
 @lru_cache(maxsize=16)
 def logged_late(e: Explanation) -> Late | None:

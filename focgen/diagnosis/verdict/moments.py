@@ -43,6 +43,19 @@ class Changed(Instead):
 
     cut: Pieces
 
+    @property
+    def may_be(self) -> str:
+        """As of :class:`Instead`."""
+        where = (
+            f"{m.within:.4g} s into {m.experiment} by {m.rms:.3g} (root mean square; on average "
+            f"{m.mean:+.3g})"
+            for m in self.moments
+        )
+        return (
+            f"it may be ({self.sure:.0%}) that at once it becomes another: {', '.join(where)}; "
+            "diagnose the parts by themselves"
+        )
+
     @cached_property
     def moments(self) -> tuple[Moment, ...]:
         """What becomes another at each of the cuts."""

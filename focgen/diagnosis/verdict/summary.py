@@ -12,6 +12,7 @@ from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.hypotheses.rivals import Cause
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.verdict import compose
+from focgen.diagnosis.verdict.clocks import clocks_apart
 from focgen.diagnosis.verdict.cross_validation import cross_validated_share
 from focgen.diagnosis.verdict.crossed import crossed
 from focgen.diagnosis.verdict.floor import floor as noise_floor
@@ -134,7 +135,7 @@ def _summary(
 
 def doubts(e: Explanation) -> tuple[Instead | None, ...]:
     """What no effect is, and may be there instead of what was found."""
-    return changed_at_once(e), logged_late(e), unevenly_paced(e)
+    return changed_at_once(e), logged_late(e), clocks_apart(e), unevenly_paced(e)
 
 
 def sound_parts(explanations: Sequence[Explanation]) -> dict[Explanation, Explanation]:

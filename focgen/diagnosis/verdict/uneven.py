@@ -19,6 +19,11 @@ from focgen.diagnosis.hypotheses.uneven_pace import uneven_paces
 from focgen.diagnosis.verdict.instead import Instead, bases, gone, is_likelier, odds_over
 
 _ITERATIONS = 12
+_AT = {
+    "level": "at its highest level as at 0",
+    "time": "at the session's end as at its begin",
+    "speed": "at its greatest speed as near rest",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +34,16 @@ class Uneven(Instead):
     stage: str
     by: str
     slowness: float
+
+    @property
+    def may_be(self) -> str:
+        """As of :class:`Instead`."""
+        slower = self.slowness >= 1.0
+        times = self.slowness if slower else 1.0 / self.slowness
+        return (
+            f"the {self.stage} may be ({self.sure:.0%}) {times:.2g} times as {'slow' if slower else 'fast'} "
+            f"{_AT[self.by]}, which no effect of the library is"
+        )
 
 
 @lru_cache(maxsize=16)

@@ -9,6 +9,7 @@ from focgen.diagnosis.hypotheses.converter import is_rounded
 from focgen.diagnosis.hypotheses.disturbance import Disturbance, disturbance
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.numbers import NUMBERS
+from focgen.diagnosis.verdict.clocks import are_apart
 from focgen.diagnosis.verdict.late import is_late
 from focgen.diagnosis.verdict.moments import another
 from focgen.diagnosis.verdict.outside import from_outside
@@ -19,8 +20,8 @@ from focgen.rig.effects import library
 def is_unknown(e: Explanation) -> bool:
     """Whether much of what inputs predict of the nominal residual is still there after the effects, or what
     hardly any of them explains is not just noise, or what moves with time moves at once, or the command was
-    logged late or a pace is uneven instead; unless a coarse converter explains it, or the nominal chain that
-    is off by itself does."""
+    logged late, columns go by clocks of their own or a pace is uneven instead; unless a coarse converter
+    explains it, or the nominal chain that is off by itself does."""
     if e.whole is not None and not e.causes:
         return False
     if e.converter is not None and e.converter.explains(e.best):
@@ -31,7 +32,7 @@ def is_unknown(e: Explanation) -> bool:
     if (
         e.causes
         and not is_rounded(e.causes)
-        and (from_outside(e) or another(e) or is_late(e) or is_uneven(e))
+        and (from_outside(e) or another(e) or is_late(e) or are_apart(e) or is_uneven(e))
     ):
         return True
     if e.predictability.share < NUMBERS.left:
