@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from focgen.diagnosis.diagnose import diagnose
-from focgen.diagnosis.hypotheses import explain
+from focgen.diagnosis.hypotheses import between_samples
 from focgen.diagnosis.hypotheses.rivals import Rival
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
@@ -109,9 +109,9 @@ def test_the_first_rivals_take_over_how_the_command_runs_between_samples(monkeyp
     def fitted(way):
         return SimpleNamespace(problem=SimpleNamespace(segment=SimpleNamespace(between=way)))
 
-    monkeypatch.setattr(explain, "_moved_to", lambda of, segment, weighing: fitted(segment.between))
+    monkeypatch.setattr(between_samples, "moved_to", lambda of, segment, weighing: fitted(segment.between))
     found, best, others = fitted("held"), fitted("straight"), [fitted("held") for _ in range(4)]
     rivals = [Rival(str(i), "actuator", 0.0, 0.0, fit) for i, fit in enumerate([found, *others])]
-    now = explain._in_the_end(rivals, found, best, None)
+    now = between_samples.in_the_end(rivals, found, best, None)
     assert now[0].fit is best
     assert [r.fit.problem.segment.between for r in now] == ["straight"] * 3 + ["held"] * 2

@@ -17,12 +17,12 @@ from focgen.diagnosis.belief.likelihood import Scale, log_likelihood, paid
 from focgen.diagnosis.belief.standing import behind, least_set, nominal_off, probabilities, tied_within
 from focgen.diagnosis.belief.unknown import is_none
 from focgen.diagnosis.fitting.fit import WHITE, fit
-from focgen.diagnosis.hypotheses import explain
+from focgen.diagnosis.hypotheses import explain, rivals
 from focgen.diagnosis.hypotheses.nuisances import uncertain
 from focgen.diagnosis.hypotheses.rivals import Rival, _needed
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.segments import make
-from focgen.diagnosis.verdict import nominal
+from focgen.diagnosis.verdict import nominal, unexplained
 from focgen.diagnosis.verdict.confidence import nominal_instead, tied
 from focgen.diagnosis.verdict.nominal import likelier_nominal
 from focgen.fractional.transfer import TransferFunction
@@ -318,3 +318,35 @@ def test_beside_an_effect_what_is_likelier_the_nominal_chain_is_not_named(monkey
     assert left_out(faint) == left_out(clear) == []
     assert left_out(faint, clear) == [faint] and left_out(fainter, faint) == [fainter]
     assert left_out(faint, clear, unknown=True) == []
+
+
+@pytest.mark.parametrize("part, off", [(0.25, True), (0.6, False)])
+def test_what_left_for_the_nominal_chain_is_kept_in_mind(monkeypatch, part, off):
+    """A bent spring of a quarter of what the chain is off by leaves; one that was in vain leaves no trace."""
+    odds = 300.0 if off else -1.0
+    curve = SimpleNamespace(rivals=[replace(_rival("contact", odds, part * NUMBERS.bent), separation=0.0)])
+    left = {"with": (curve,), "without": ()}
+    monkeypatch.setattr(rivals, "_causes", lambda best, beside: left[best])
+    monkeypatch.setattr(rivals, "without_family", lambda *_: "without")
+    beside = SimpleNamespace(granted=False, weighing=None, known=())
+    found = rivals.reexamined("with", beside)
+    assert found.best == "without" and not found.causes
+    assert (found.off is not None) == off
+    assert not off or (found.off.best == "with" and found.off.causes == (curve,))
+
+
+@pytest.mark.parametrize("explained", [True, False])
+def test_what_the_nominal_chain_is_off_by_is_not_unknown(monkeypatch, explained):
+    """Without the curve, slow swings were left that nothing explains; with it, noise."""
+    whole = SimpleNamespace(causes=("a curve",), whole=None)
+    judged = []
+    monkeypatch.setattr(unexplained, "disturbed", judged.append)
+    monkeypatch.setattr(unexplained, "_is_disturbed", lambda e, left: e is whole and not explained)
+    whole.converter, whole.segment = None, SimpleNamespace(closed=False)
+    whole.predictability = SimpleNamespace(share=0.0)
+    for asked in ("from_outside", "another", "is_late", "are_apart", "is_uneven"):
+        monkeypatch.setattr(unexplained, asked, lambda e: False)
+    monkeypatch.setattr(unexplained, "is_rounded", lambda causes: False)
+    bare = SimpleNamespace(causes=(), whole=whole)
+    assert unexplained.is_unknown(bare) == (not explained)
+    assert judged == [whole]

@@ -12,11 +12,12 @@ from focgen.diagnosis.fitting.integrating import settled
 from focgen.diagnosis.fitting.predictability import Predictability, predictability
 from focgen.diagnosis.fitting.realign import realigned
 from focgen.diagnosis.hypotheses.accept import AcceptanceCriteria, select
+from focgen.diagnosis.hypotheses.between_samples import between_anew, in_the_end, moved_to
 from focgen.diagnosis.hypotheses.converter import Converter, converter_of
 from focgen.diagnosis.hypotheses.foretelling import foretelling
 from focgen.diagnosis.hypotheses.left import remembers, unleft
-from focgen.diagnosis.hypotheses.nuisances import may_be_more, uncertain, ways
-from focgen.diagnosis.hypotheses.rivals import Beside, Cause, Rival, left_out, reexamined
+from focgen.diagnosis.hypotheses.nuisances import may_be_more, uncertain
+from focgen.diagnosis.hypotheses.rivals import Beside, Cause, Examined, left_out, reexamined
 from focgen.diagnosis.hypotheses.search import Ranking, evidence, rank
 from focgen.diagnosis.hypotheses.seen_through import with_steps
 from focgen.diagnosis.hypotheses.two import two_at_once
@@ -36,7 +37,6 @@ from focgen.rig.session import run_of
 _DEPTH = 4
 _KEPT = 10.0  # times the pace at which a rig that integrates is searched where that shows nothing: of a small
 # force the path shows more above the sensor's noise the longer it is kept
-_COMPARED = 3  # rivals that experiments are to tell apart
 _BELIEVED = 6.0  # uncertainties that a number may be off beside an effect: beyond, something else is missing
 
 
@@ -45,7 +45,7 @@ class Explanation:
     """A segment explained. ``nominal``: its nominal parameters refitted; ``best``: with the effects. Each has
     a ``predictability`` of its residual from the inputs. ``errors``: by family, the root-mean-square
     residual with that effect alone, as a share of the refitted nominal's; ``converter``: the coarse one;
-    ``whole``: what this is the part of that is not in question.
+    ``whole``: what this is the part of that is not in question, or no effect at all.
     """
 
     segment: Segment
@@ -219,17 +219,18 @@ def _explained(
     nominal = fit(problem, rankings[0].base.vector[: len(given)], weighing)
     errors = rankings[0].errors
     if remembers(best) and not asked.granted and (seen := unleft(best)) is not None:
-        best, nominal = (_moved_to(f, seen, weighing) for f in (best, nominal))
+        best, nominal = (moved_to(f, seen, weighing) for f in (best, nominal))
         best, rankings = _dropped(best, weighing, threshold, known), []
     beside = Beside(nominal, rankings, candidates, weighing, asked.surroundings, asked.granted, known)
-    best, causes = reexamined(best, beside)
+    examined = reexamined(best, beside)
+    best, causes = examined.best, examined.causes
     if converter is not None:
         best, causes = with_steps(converter, best, causes, beside, asked)
-    found, (best, nominal) = best, map(settled, _between_anew(rig, best, nominal, weighing))
+    found, (best, nominal) = best, map(settled, between_anew(rig, best, nominal, weighing))
     segment = best.problem.segment
-    causes = tuple(replace(c, rivals=_in_the_end(c.rivals, found, best, weighing)) for c in causes)
+    causes = tuple(replace(c, rivals=in_the_end(c.rivals, found, best, weighing)) for c in causes)
     response = problem.references.clocks["response"]
-    return Explanation(
+    made = Explanation(
         segment,
         given,
         nominal,
@@ -241,6 +242,17 @@ def _explained(
         errors,
         converter,
     )
+    return _off_by_itself(made, examined.off)
+
+
+def _off_by_itself(e: Explanation, off: Examined | None) -> Explanation:
+    """An explanation without effects, as the part of that with one more that is not in question: the nominal
+    chain is off by what it changes, and what inputs predict of that is explained."""
+    if off is None or e.causes:
+        return e
+    response = e.nominal.problem.references.clocks["response"]
+    with_it = predictability(e.segment, off.best.weighed, response)
+    return replace(e, whole=replace(e, best=off.best, causes=off.causes, predictability=with_it))
 
 
 def _unsure(problem: Problem, vector: np.ndarray, unsure: Strays | None) -> tuple[float, np.ndarray | None]:
@@ -253,33 +265,10 @@ def _unsure(problem: Problem, vector: np.ndarray, unsure: Strays | None) -> tupl
     return carried, noise if np.any(noise) else None
 
 
-def _between_anew(rig: Rig, best: Fit, nominal: Fit, weighing: Weighing) -> tuple[Fit, Fit]:
-    """Both fits with the command running between its samples as suits what was found: a nominal rig far from
-    what it models may be suited by another way. That has to leave much less: half a sample more or less may
-    make up for a little of whatever a model lacks."""
-    segment = best.problem.segment
-    if rig.between is not None or segment.entry != "command" or not best.problem.candidates:
-        return best, nominal
-    others = [replace(segment, between=way) for way in ways(segment) if way != segment.between]
-    tried = [_moved_to(best, other, weighing) for other in others]
-    closest = min([best, *tried], key=lambda f: f.sse)
-    if closest.sse > NUMBERS.unlikely * best.sse:
-        return best, nominal
-    return closest, _moved_to(nominal, closest.problem.segment, weighing)
-
-
-def _moved_to(of: Fit, segment: Segment, weighing: Weighing) -> Fit:
-    """A fit made anew to another account of its segment."""
-    problem = replace(of.problem, segment=segment, memory={})
-    start = of.vector.copy()
-    start[len(problem.nominal_start)] = 0.0  # the alignment made up for the wrong way
-    return fit(problem, start, weighing, 8)
-
-
 def gained(of: Explanation, logs: Sequence[Experiment]) -> float:
     """Nats that an explanation gains, its numbers fitted anew, where its experiments begin as in ``logs``."""
     segment = replace(of.best.problem.segment, run=run_of(logs, of.segment.entry))
-    return evidence(_moved_to(of.best, segment, Weighing(of.ar)), of.best)
+    return evidence(moved_to(of.best, segment, Weighing(of.ar)), of.best)
 
 
 def remembering(of: Explanation) -> Explanation | None:
@@ -290,21 +279,6 @@ def remembering(of: Explanation) -> Explanation | None:
         return None
     best = left_out(of.best, others, Weighing(of.ar)) if others else of.best
     return replace(of, best=best)
-
-
-def _in_the_end(rivals: Sequence[Rival], found: Fit, best: Fit, weighing: Weighing) -> tuple[Rival, ...]:
-    """Rivals with what was ``found`` as that is in the end, and the first of the others on the same account
-    of what the command does between samples: experiments are chosen by what these would show."""
-
-    def now(rival: Rival, near: bool) -> Rival:
-        if rival.fit is found:
-            return replace(rival, fit=best)
-        segment = best.problem.segment
-        if not near or rival.fit.problem.segment.between == segment.between:
-            return rival
-        return replace(rival, fit=_moved_to(rival.fit, segment, weighing))
-
-    return tuple(now(r, i < _COMPARED) for i, r in enumerate(rivals))
 
 
 def _or_two(

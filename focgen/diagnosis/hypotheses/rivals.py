@@ -68,10 +68,21 @@ class Beside:
     known: Sequence[Fit] = ()
 
 
-def reexamined(best: Fit, beside: Beside) -> tuple[Fit, tuple[Cause, ...]]:
+@dataclass(frozen=True, eq=False)
+class Examined:
+    """Effects that stand, and what they rest on: ``best`` with the ``causes``. ``off``: the same with one
+    more, which left because the nominal chain is as good as sure to be off by itself; None where none did."""
+
+    best: Fit
+    causes: tuple[Cause, ...]
+    off: Examined | None = None
+
+
+def reexamined(best: Fit, beside: Beside) -> Examined:
     """Every effect held against its rivals beside the others; where one of them does better, it takes the
     place, and where none is likelier than that nothing more is there, as what came later may make it, all
     leave it. So they do where the nominal chain is as good as sure to be off by itself."""
+    off = None
     for _ in range(_SWAPS):
         causes = _causes(best, beside)
         first = [c.rivals[0] for c in causes]
@@ -81,9 +92,10 @@ def reexamined(best: Fit, beside: Beside) -> tuple[Fit, tuple[Cause, ...]]:
             continue
         needless = min(first, key=_needed, default=None)
         if needless is None or _needed(needless) >= 0.0 or beside.granted:
-            return best, causes
+            return Examined(best, causes, off)
+        off = Examined(best, causes) if holds(needless.off) else None
         best = without_family(best, needless.effect, beside.weighing, beside.known)
-    return best, _causes(best, beside)
+    return Examined(best, _causes(best, beside), off)
 
 
 def _needed(rival: Rival) -> float:

@@ -29,7 +29,7 @@ from focgen.diagnosis.verdict.evidence import Evidence
 from focgen.diagnosis.verdict.improvement import Improvement
 from focgen.diagnosis.verdict.moments import another
 from focgen.diagnosis.verdict.moves import far_moves
-from focgen.diagnosis.verdict.nominal import likelier_nominal, unnamed
+from focgen.diagnosis.verdict.nominal import likelier_nominal, nominal_alone, unnamed
 from focgen.diagnosis.verdict.sizes import estimates
 from focgen.diagnosis.verdict.summary import Summary, doubts, sorted_out, sound_parts
 from focgen.diagnosis.verdict.unexplained import disturbed
@@ -80,7 +80,7 @@ def conclude(
         notes=(
             *notes_of(logs),
             *far_moves(rig, summary.rigs.fitted if summary.causes else summary.rigs.refitted),
-            *cautions(summary.causes, unknown, list(doubted), off),
+            *cautions(summary.causes, unknown, list(doubted), [*off, *nominal_alone(explanations, off)]),
             *lesser(stands.beside),
             *the_rest(summary),
             *paced(explanations),

@@ -14,6 +14,7 @@ from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.hypotheses.rivals import Cause, without_family
 from focgen.diagnosis.verdict.confidence import nominal_instead
 from focgen.diagnosis.verdict.unexplained import is_unknown
+from focgen.present import present
 
 
 def likelier_nominal(explanations: Sequence[Explanation]) -> list[tuple[Explanation, Cause]]:
@@ -22,6 +23,16 @@ def likelier_nominal(explanations: Sequence[Explanation]) -> list[tuple[Explanat
     every = [(e, c) for e in explanations if e.causes and not is_unknown(e) for c in e.causes]
     every.sort(key=lambda each: nominal_instead(each[1].rivals[0]))
     return [(e, c) for e, c in every[1:] if nominal_instead(c.rivals[0]) > 0.5]
+
+
+def nominal_alone(
+    explanations: Sequence[Explanation], others: Sequence[tuple[Explanation, Cause]]
+) -> list[tuple[Explanation, Cause]]:
+    """What left a segment without any effect, for the nominal chain is as good as sure to be off by it;
+    beside ``others`` that were likelier the chain."""
+    alone = [e for e in explanations if e.whole is not None and not e.causes and not is_unknown(e)]
+    left = [(e, c) for e in alone for c in present(e.whole).causes]
+    return [(e, c) for e, c in left if all(c is not other for _, other in others)]
 
 
 def unnamed(e: Explanation, causes: Sequence[Cause]) -> Explanation:

@@ -23,7 +23,7 @@ def is_unknown(e: Explanation) -> bool:
     logged late, columns go by clocks of their own or a pace is uneven instead; unless a coarse converter
     explains it, or the nominal chain that is off by itself does."""
     if e.whole is not None and not e.causes:
-        return False
+        return is_unknown(e.whole)
     if e.converter is not None and e.converter.explains(e.best):
         return False
     left = disturbed(e)

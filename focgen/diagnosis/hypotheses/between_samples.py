@@ -1,0 +1,53 @@
+"""What a command does between its samples, as suits what was found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from focgen.diagnosis.fitting.fit import Fit, Weighing, fit
+from focgen.diagnosis.hypotheses.nuisances import ways
+from focgen.diagnosis.hypotheses.rivals import Rival
+from focgen.diagnosis.numbers import NUMBERS
+from focgen.diagnosis.problem.segments import Segment
+from focgen.rig.rig import Rig
+
+_COMPARED = 3  # rivals that experiments are to tell apart
+
+
+def between_anew(rig: Rig, best: Fit, nominal: Fit, weighing: Weighing) -> tuple[Fit, Fit]:
+    """Both fits with the command running between its samples as suits what was found: a nominal rig far from
+    what it models may be suited by another way. That has to leave much less: half a sample more or less may
+    make up for a little of whatever a model lacks."""
+    segment = best.problem.segment
+    if rig.between is not None or segment.entry != "command" or not best.problem.candidates:
+        return best, nominal
+    others = [replace(segment, between=way) for way in ways(segment) if way != segment.between]
+    tried = [moved_to(best, other, weighing) for other in others]
+    closest = min([best, *tried], key=lambda f: f.sse)
+    if closest.sse > NUMBERS.unlikely * best.sse:
+        return best, nominal
+    return closest, moved_to(nominal, closest.problem.segment, weighing)
+
+
+def moved_to(of: Fit, segment: Segment, weighing: Weighing) -> Fit:
+    """A fit made anew to another account of its segment."""
+    problem = replace(of.problem, segment=segment, memory={})
+    start = of.vector.copy()
+    start[len(problem.nominal_start)] = 0.0  # the alignment made up for the wrong way
+    return fit(problem, start, weighing, 8)
+
+
+def in_the_end(rivals: Sequence[Rival], found: Fit, best: Fit, weighing: Weighing) -> tuple[Rival, ...]:
+    """Rivals with what was ``found`` as that is in the end, and the first of the others on the same account
+    of what the command does between samples: experiments are chosen by what these would show."""
+
+    def now(rival: Rival, near: bool) -> Rival:
+        if rival.fit is found:
+            return replace(rival, fit=best)
+        segment = best.problem.segment
+        if not near or rival.fit.problem.segment.between == segment.between:
+            return rival
+        return replace(rival, fit=moved_to(rival.fit, segment, weighing))
+
+    return tuple(now(r, i < _COMPARED) for i, r in enumerate(rivals))
