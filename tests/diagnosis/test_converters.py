@@ -70,9 +70,10 @@ def test_levels_are_seen_through_noise_and_only_levels():
     )  # it passes between its rests
 
 
-@pytest.mark.parametrize("noises", (9.5, 11.0))
+@pytest.mark.parametrize("noises", (5.5, 7.5, 9.5, 11.0))
 def test_levels_are_seen_where_noise_hardly_reaches_half_way_to_the_next(noises):
-    """Steps of nine noises look like a staircase to anybody, and passed for noise of the output."""
+    """Steps of nine noises look like a staircase to anybody, and passed for noise of the output. Of six or
+    eight, readings of one level reach the next one's half."""
     rng, step = np.random.default_rng(11), 0.09
     swept = np.interp(np.arange(3500.0), [0, 800, 1300, 1650, 2050, 3500], [0, 1, 0.3, 0.75, 0.15, 1])
     reading = step * np.round(swept / step) + step / noises * rng.normal(size=3500)
