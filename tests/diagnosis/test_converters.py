@@ -81,6 +81,12 @@ def test_levels_are_seen_where_noise_hardly_reaches_half_way_to_the_next(noises)
     assert abs(found - step) < 0.01 * step and abs(phase) < 0.03 * step
 
 
+def test_a_reading_that_hardly_moves_from_sample_to_sample_takes_no_time_to_look_at():
+    """A thousand millionth of its span: no histogram of noises has so many bins."""
+    reading = np.cumsum(np.r_[np.full(4000, 1e-9), 1.0, np.full(4000, 1e-9)])
+    assert SEEN(reading) is None
+
+
 def test_many_levels_are_counted_one_by_one():
     """The middle of a level that is seldom read is a little off: by its distance others were miscounted."""
     rng, step = np.random.default_rng(5), 0.25

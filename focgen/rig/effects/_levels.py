@@ -11,12 +11,12 @@ _COVERED = 0.6  # of the samples lie on a few levels
 _COVERED_BY_TWO = 0.999  # the same of two levels, which may be rests of a finer reading
 # of the noise of a reading whose levels are blurred
 _OF_NOISE = 0.954  # what half of all steps between neighbours are below, where both are noise
-_BIN = 0.25  # a bin of the histogram
+_BIN = 0.25  # a bin of the histogram,
+_BINS = 50_000  # of which there are so many at most: of a finer reading no step is that small
+_RESOLVED = 4.0  # bins of a step, at least
 _APART = 5.0  # two levels, at least
 _FINE = 8  # times as many frequencies as bins
-_TALL = (
-    0.9  # of what noise leaves of a comb: rests that happen to be even have passages between them, and less
-)
+_TALL = 0.9  # of what noise leaves of a comb; of rests that happen to be even, with passages, less is left
 _WIDE, _HALF_WAY = 4.5, 0.45  # a level, either way; of a step at most
 _PASSES = 2  # samples between two levels, for each change of level: what resampling leaves there
 _LEVELS, _SELDOM = 3, 5e-4  # levels at least, for two may be the rests of a rig, with so many of all samples
@@ -35,11 +35,11 @@ def _blurred(y: Array) -> Values | None:
     span = float(np.ptp(y))
     if not 0.0 < _APART * noise < span / 2.0:
         return None
-    width = _BIN * noise
+    width = max(_BIN * noise, span / _BINS)
     histogram = np.bincount(((y - y.min()) / width).astype(int))
     tall = np.abs(np.fft.rfft(histogram, _FINE * len(histogram))) / len(y)
     often = np.arange(len(tall)) / (_FINE * len(histogram) * width)
-    asked = (often >= 2.0 / span) & (often <= 1.0 / (_APART * noise))
+    asked = (often >= 2.0 / span) & (often <= 1.0 / max(_APART * noise, _RESOLVED * width))
     comb = np.where(asked, tall * np.exp(2.0 * (np.pi * noise * often) ** 2), 0.0)
     if comb.max() < _TALL:
         return None
