@@ -83,7 +83,7 @@ def test_levels_are_seen_where_noise_hardly_reaches_half_way_to_the_next(noises)
 
 def test_a_reading_that_hardly_moves_from_sample_to_sample_takes_no_time_to_look_at():
     """A thousand millionth of its span: no histogram of noises has so many bins."""
-    reading = np.cumsum(np.r_[np.full(4000, 1e-9), 1.0, np.full(4000, 1e-9)])
+    reading = np.cumsum(np.r_[np.full(2100, 1e-9), np.full(4000, 5e-4), np.full(2100, 1e-9)])
     assert SEEN(reading) is None
 
 
