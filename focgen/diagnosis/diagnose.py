@@ -13,9 +13,17 @@ from focgen.arguments import checked
 from focgen.control.files import ControllerLike, controller_from
 from focgen.control.units import check_one_unit
 from focgen.diagnosis.controller.check import CONTROLLER_EFFECTS, check_controller
+from focgen.diagnosis.fitting.fit import Fit
 from focgen.diagnosis.fitting.predictability import predicted
 from focgen.diagnosis.hypotheses.bootstrap import threshold as bootstrapped
-from focgen.diagnosis.hypotheses.explain import Explanation, candidates_for, explain, gained, remembering
+from focgen.diagnosis.hypotheses.explain import (
+    Explanation,
+    candidates_for,
+    explain,
+    gained,
+    remembering,
+    square_told,
+)
 from focgen.diagnosis.hypotheses.initial import begun_session, begun_with, loosened
 from focgen.diagnosis.hypotheses.input_covariance import input_covariance
 from focgen.diagnosis.model import Diagnosis
@@ -40,6 +48,7 @@ from focgen.rig.plausibility import doubts
 from focgen.rig.replay import experiments
 from focgen.rig.rig import Rig
 
+_RIVALS = 3  # of what was found that may tell how the logs begin
 _CARRIED = 2  # times that findings are made anew with what they left in later experiments
 EFFECTS = {*library(), *CONTROLLER_EFFECTS}
 WRITTEN = ("diagnosis.json", "signals.json", "refitted.toml", "augmented.toml")  # beside the pictures
@@ -84,6 +93,7 @@ def diagnose(
     session = begun_session(nominal, session)
     explanations = explain_all(nominal, session, NUMBERS.nats, only, bootstrap)
     nominal = explanations[0].with_intersample(nominal)
+    explanations, session = _told_by_another(nominal, explanations, session, only, bootstrap)
     explanations, session = _lasting(nominal, explanations, session, only, bootstrap)
     rigs = compose.compose(nominal, explanations, session)
     explanations, rigs, session = _carried_on(nominal, explanations, rigs, session, only, bootstrap)
@@ -103,6 +113,44 @@ def diagnose(
 
         write(out, diagnosis, proposed[1] if proposed else None, pictures, given)
     return diagnosis
+
+
+def _told_by_another(
+    nominal: Rig,
+    explanations: tuple[Explanation, ...],
+    session: tuple[Experiment, ...],
+    only: Sequence[str] | None,
+    bootstrap: int,
+) -> tuple[tuple[Explanation, ...], tuple[Experiment, ...]]:
+    """The findings and the session, made anew with the begins that a rival tells where it leaves less by
+    these than what was found does by its own: the pasts were told without any effect, and to one that
+    remembers such a past does injustice."""
+    estimated = any(not b.known for log in session for b in log.begins.values())
+    if only is not None or not estimated:
+        return explanations, session
+    for number, e in enumerate(explanations):
+        tried = [rival.fit for rival in e.causes[0].rivals[:_RIVALS]] if e.causes else []
+        told = [_begun_by(nominal, explanations, number, fit, session) for fit in tried]
+        left = [square_told(e, fit, logs) for fit, logs in zip(tried, told)]
+        if left and min(left) < left[0]:
+            step("how the logs begin")
+            logs = told[int(np.argmin(left))]
+            again = _better(nominal, explanations, logs, only, bootstrap)
+            explanations, session = (again, logs) if again else (explanations, session)
+    return explanations, session
+
+
+def _begun_by(
+    nominal: Rig,
+    explanations: Sequence[Explanation],
+    number: int,
+    of: Fit,
+    session: Sequence[Experiment],
+) -> tuple[Experiment, ...]:
+    """The session with its begins told by the rig as explained, but for one segment by another fit."""
+    others = [replace(e, best=of) if k == number else e for k, e in enumerate(explanations)]
+    rigs = compose.compose(nominal, others, session)
+    return begun_with(rigs.fitted, rigs.placed, session)
 
 
 def _lasting(

@@ -265,6 +265,13 @@ def _unsure(problem: Problem, vector: np.ndarray, unsure: Strays | None) -> tupl
     return carried, noise if np.any(noise) else None
 
 
+def square_told(of: Explanation, fit: Fit, logs: Sequence[Experiment]) -> float:
+    """The mean square that a fit of its segment leaves, made anew, where its experiments begin as in
+    ``logs``."""
+    segment = replace(fit.problem.segment, run=run_of(logs, of.segment.entry))
+    return float(np.mean(moved_to(fit, segment, Weighing(of.ar)).weighed ** 2))
+
+
 def gained(of: Explanation, logs: Sequence[Experiment]) -> float:
     """Nats that an explanation gains, its numbers fitted anew, where its experiments begin as in ``logs``."""
     segment = replace(of.best.problem.segment, run=run_of(logs, of.segment.entry))
