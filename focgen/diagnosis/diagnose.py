@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -129,15 +129,26 @@ def _told_by_another(
     if only is not None or not estimated:
         return explanations, session
     for number, e in enumerate(explanations):
-        tried = [rival.fit for rival in e.causes[0].rivals[:_RIVALS]] if e.causes else []
+        tried = [e.best, *_others(nominal, e, session)]
         told = [_begun_by(nominal, explanations, number, fit, session) for fit in tried]
         left = [square_told(e, fit, logs) for fit, logs in zip(tried, told)]
-        if left and min(left) < left[0]:
+        if min(left) < left[0]:
             step("how the logs begin")
             logs = told[int(np.argmin(left))]
             again = _better(nominal, explanations, logs, only, bootstrap)
             explanations, session = (again, logs) if again else (explanations, session)
     return explanations, session
+
+
+def _others(nominal: Rig, e: Explanation, session: Sequence[Experiment]) -> Iterator[Fit]:
+    """The first rivals of what was found, and where inputs predict much of what that leaves the families that
+    leave least by themselves, however far behind."""
+    known = {rival.effect: rival.fit for cause in e.causes[:1] for rival in cause.rivals[:_RIVALS]}
+    yield from list(known.values())[1:]
+    if e.predictability.share > NUMBERS.left:
+        others = sorted((name for name in e.errors if name not in known), key=lambda name: e.errors[name])
+        for name in others[:_RIVALS]:
+            yield explain(nominal, e.segment, session, NUMBERS.nats, [name]).best
 
 
 def _begun_by(

@@ -3,6 +3,8 @@
 Red when a log's begin is taken for an effect, or hides one.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,8 +14,8 @@ from focgen.diagnosis.problem.segments import make
 from focgen.logs.begin import Begin
 from focgen.logs.experiment import Experiment
 from focgen.logs.read import in_session_order
-from focgen.rig.effects import Run
-from focgen.rig.engine import Chain
+from focgen.rig.effects import Run, form_of
+from focgen.rig.engine import Chain, Placed
 from focgen.rig.initial import NOTE
 from focgen.rig.rig import Actuator, Rig, Signals
 from tests.diagnosis_rig import RIG, H, session
@@ -108,3 +110,25 @@ def test_what_a_rest_of_unknown_length_left_is_no_drift(noise):
     """Of 50: it was `sensor_drift`, and `unknown`."""
     found = diagnose(FINGER, rested(1, noise), pictures=False)
     assert found.verdict in ("none", "parameters") and not found.causes
+
+
+def relaxing(logs, share, time, seed):
+    """The ``logs`` with a reading that relaxes by a ``share`` within a ``time`` in s."""
+    rng, slow = np.random.default_rng(seed), form_of("sensor_relaxation", "one_time")
+    chain = Chain(RIG, (Placed("sensor_relaxation", slow, "sensor", (share, time)),))
+    for log in logs:
+        noisy = {name: 0.006 * rng.normal(size=len(log)) for name in ("pressure", "curvature", "output")}
+        read = chain.run(log["curvature"], "sensor", "sensor", Run.of([len(log)], [0.0], H))
+        clean = {**log.signals, "output": read}
+        signals = {name: v + np.abs(v).max() * noisy.get(name, 0.0) for name, v in clean.items()}
+        yield replace(log, signals=signals)
+
+
+@pytest.mark.parametrize("kept", [("steps", "hold"), ("steps", "stairs", "sines")])
+def test_a_past_is_told_by_what_remembers_it(kept):
+    """Told without the effect it suited a bent reading, or a loop, at 0.95, which left two to three times the
+    noise."""
+    logs = [log for log in session(1, noise=0.0) if log.name in kept]
+    found = diagnose(RIG, cut(tuple(relaxing(logs, 0.4, 100.0, 1))), pictures=False)
+    assert named(found) == [["sensor_relaxation"]]
+    assert found.gap.explained < 1.5 * found.gap.floor
