@@ -46,6 +46,7 @@ _NOTHING = 0.06  # of the input's largest magnitude: what counts as 0
 _LITTLE = 0.01  # of it: less, held before a log, does not show
 _BEYOND = 0.2  # of it: by so much earlier levels may leave the input's range
 _TIMES_AS_FAR = (0.5, 2.0)  # a past that another signal's made may be from where the log begins
+_NOWHERE = 1e3  # of a signal's largest magnitude: where a spring that gives way has nothing to hold it
 _SHOWN = 0.3  # of a response time at 0: what is shorter shows no decay
 _FORGOTTEN = 5.0  # response times after which the past shows no more,
 _MOSTLY = 0.9  # of what is left from there on an offset may be: a signal that comes back to 0 has none
@@ -215,7 +216,7 @@ class _Setting:
         self.chain.run(self.x, *self.stages, run, between_of(self.chain.rig, self.entry), tap)
         made = [tap[stage] / unit for stage, unit in zip(self.roles, self.units)]
         missed: Array = self.y - np.stack(made, axis=1)
-        return missed
+        return np.nan_to_num(missed, nan=_NOWHERE, posinf=_NOWHERE, neginf=-_NOWHERE)
 
     @cached_property
     def borne(self) -> Array:

@@ -312,3 +312,22 @@ def test_a_dead_time_shows_what_was_before(delay, held):
     y = answer(rig, np.full(N, 1.4), Begin((1.4,)), "regulator", held)
     np.testing.assert_allclose(y, y[-1], rtol=1e-9)
     assert y[0] == pytest.approx(RIG.actuator.drive(0.14), rel=1e-9)
+
+
+def test_a_past_in_which_nothing_holds_a_spring_is_none(monkeypatch):
+    """A spring that gives way runs off to NaN from some of the levels that are tried; the others tell."""
+    run, seen = Chain.run, []
+
+    def breaking(self, x, first, last, over, *further):
+        made = run(self, x, first, last, over, *further)
+        if over.begins and len(over.begins[0].levels) == 3:
+            seen.append(over)
+            for signal in (made, *further[1].values()):
+                signal[:] = np.nan
+        return made
+
+    monkeypatch.setattr(Chain, "run", breaking)
+    steps = cut(session(seed=1)[0], 8.0 + 2.5)
+    (told,) = begun(RIG, [steps])
+    assert seen and told.before("command").levels[-1] == pytest.approx(1.2)
+    assert all(np.all(np.isfinite((*b.levels, *b.ago))) for b in told.begins.values())
