@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -18,11 +18,11 @@ from focgen.diagnosis.fitting.predictability import predicted
 from focgen.diagnosis.hypotheses.bootstrap import threshold as bootstrapped
 from focgen.diagnosis.hypotheses.explain import (
     Explanation,
+    begun_as,
     candidates_for,
     explain,
     gained,
     remembering,
-    square_told,
 )
 from focgen.diagnosis.hypotheses.initial import begun_session, begun_with, loosened
 from focgen.diagnosis.hypotheses.input_covariance import input_covariance
@@ -93,10 +93,11 @@ def diagnose(
     session = begun_session(nominal, session)
     explanations = explain_all(nominal, session, NUMBERS.nats, only, bootstrap)
     nominal = explanations[0].with_intersample(nominal)
-    explanations, session = _told_by_another(nominal, explanations, session, only, bootstrap)
-    explanations, session = _lasting(nominal, explanations, session, only, bootstrap)
+    search = _Search(nominal, only, bootstrap)
+    explanations, session = _told_by_another(search, explanations, session)
+    explanations, session = _lasting(search, explanations, session)
     rigs = compose.compose(nominal, explanations, session)
-    explanations, rigs, session = _carried_on(nominal, explanations, rigs, session, only, bootstrap)
+    explanations, rigs, session = _carried_on(search, explanations, rigs, session)
     session = begun_with(rigs.fitted, rigs.placed, session)
     rigs, diagnosis, evidence = conclude(nominal, session, rigs, explanations, ran, only is not None)
     proposed = propose(nominal, session, explanations, diagnosis.causes)
@@ -115,27 +116,42 @@ def diagnose(
     return diagnosis
 
 
+@dataclass(frozen=True)
+class _Search:
+    """What every search of a session has in common: the rig, the effects to consider, and how many sessions
+    are simulated for a threshold."""
+
+    nominal: Rig
+    only: Sequence[str] | None
+    bootstrap: int
+
+    def better(
+        self, explanations: Sequence[Explanation], session: Sequence[Experiment]
+    ) -> tuple[Explanation, ...] | None:
+        """The findings of the session as it is now, where they leave less than those so far."""
+        again = explain_all(self.nominal, session, NUMBERS.nats, self.only, self.bootstrap)
+        return again if _left_by(again) < _left_by(explanations) else None
+
+
 def _told_by_another(
-    nominal: Rig,
-    explanations: tuple[Explanation, ...],
-    session: tuple[Experiment, ...],
-    only: Sequence[str] | None,
-    bootstrap: int,
+    search: _Search, explanations: tuple[Explanation, ...], session: tuple[Experiment, ...]
 ) -> tuple[tuple[Explanation, ...], tuple[Experiment, ...]]:
     """The findings and the session, made anew with the begins that a rival tells where it leaves less by
-    these than what was found does by its own: the pasts were told without any effect, and to one that
-    remembers such a past does injustice."""
+    these than what was found does by its own. The pasts were told without any effect, and such a past
+    misleads one that remembers."""
     estimated = any(not b.known for log in session for b in log.begins.values())
-    if only is not None or not estimated:
+    if search.only is not None or not estimated:
         return explanations, session
-    for number, e in enumerate(explanations):
-        tried = [e.best, *_others(nominal, e, session)]
-        told = [_begun_by(nominal, explanations, number, fit, session) for fit in tried]
-        left = [square_told(e, fit, logs) for fit, logs in zip(tried, told)]
-        if min(left) < left[0]:
+    for number in range(len(explanations)):
+        e = explanations[number]
+        others = list(_others(search.nominal, e, session))
+        tried = [e.best, *others] if others else []
+        told = [_begun_by(search.nominal, explanations, number, fit, session) for fit in tried]
+        left = [np.mean(begun_as(e, fit, logs).weighed ** 2) for fit, logs in zip(tried, told)]
+        if left and min(left) < left[0]:
             step("how the logs begin")
             logs = told[int(np.argmin(left))]
-            again = _better(nominal, explanations, logs, only, bootstrap)
+            again = search.better(explanations, logs)
             explanations, session = (again, logs) if again else (explanations, session)
     return explanations, session
 
@@ -165,11 +181,7 @@ def _begun_by(
 
 
 def _lasting(
-    nominal: Rig,
-    explanations: tuple[Explanation, ...],
-    session: tuple[Experiment, ...],
-    only: Sequence[str] | None,
-    bootstrap: int,
+    search: _Search, explanations: tuple[Explanation, ...], session: tuple[Experiment, ...]
 ) -> tuple[tuple[Explanation, ...], tuple[Experiment, ...]]:
     """The findings and the session, made anew where a loop or a play lies, as a log begins, where the one
     before left it. A refit of what remembers, without what it was found beside, shows first whether that is
@@ -180,17 +192,15 @@ def _lasting(
     if sum(gained(bare, lasting) for e in explanations if (bare := remembering(e))) < NUMBERS.nats:
         return explanations, session
     step("what is left where the last log ended")
-    again = _better(nominal, explanations, lasting, only, bootstrap)
+    again = search.better(explanations, lasting)
     return (again, lasting) if again else (explanations, session)
 
 
 def _carried_on(
-    nominal: Rig,
+    search: _Search,
     explanations: tuple[Explanation, ...],
     rigs: compose.Rigs,
     session: tuple[Experiment, ...],
-    only: Sequence[str] | None,
-    bootstrap: int,
 ) -> tuple[tuple[Explanation, ...], compose.Rigs, tuple[Experiment, ...]]:
     """The findings and the session, made anew where an effect carries on from one experiment to the next and
     less is left for it: what it left looked like another effect, or like a fault at a begin. A refit of what
@@ -202,23 +212,11 @@ def _carried_on(
         if sum(gained(e, carried) for e in explanations) < NUMBERS.nats:
             break
         step("what carries on from one log to the next")
-        again = _better(nominal, explanations, carried, only, bootstrap)
+        again = search.better(explanations, carried)
         if again is None:
             break
-        explanations, rigs, session = again, compose.compose(nominal, again, carried), carried
+        explanations, rigs, session = again, compose.compose(search.nominal, again, carried), carried
     return explanations, rigs, session
-
-
-def _better(
-    nominal: Rig,
-    explanations: tuple[Explanation, ...],
-    session: tuple[Experiment, ...],
-    only: Sequence[str] | None,
-    bootstrap: int,
-) -> tuple[Explanation, ...] | None:
-    """The findings of the session as it is now, where they leave less than those so far."""
-    again = explain_all(nominal, session, NUMBERS.nats, only, bootstrap)
-    return again if _left_by(again) < _left_by(explanations) else None
 
 
 def _left_by(explanations: Sequence[Explanation]) -> float:

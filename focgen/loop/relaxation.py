@@ -26,6 +26,7 @@ from focgen.rig.effects import Run
 from focgen.rig.engine import Chain, Placed
 from focgen.rig.replay import placed_in, session_end
 from focgen.rig.rig import Rig
+from focgen.rig.stages import LEAVES
 
 _WINDOWS = 24  # that a run is cut into: the fewer, the more passes each
 _PASSES = 40  # after which a window is halved
@@ -70,8 +71,7 @@ class Plant:
         run = Run.of([count + 1], [self.clock], h)
         tap: dict[str, Array] = {}
         Chain(self.rig, self.placed).run(x, "regulator", "sensor", run, held, tap)
-        names = {"regulator": "pressure", "actuator": "curvature", "sensor": "output"}
-        return {names[stage]: y[self.lead * self.parts :] for stage, y in tap.items()}
+        return {LEAVES[stage]: y[self.lead * self.parts :] for stage, y in tap.items()}
 
 
 def _delays(regulator: TransferFunction) -> bool:

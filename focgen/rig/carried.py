@@ -18,7 +18,7 @@ from focgen.rig.effects import Run
 from focgen.rig.engine import Chain, between_of
 from focgen.rig.stages import ENTERS, LEAVES
 
-_FIRST = 5  # samples that tell where it ended
+FIRST = 5  # samples that tell what an input was last, and where what it drives began
 _WIDTH = 0.1  # of how long ago it is: a window, for what is left of it changes no faster
 
 
@@ -28,10 +28,10 @@ def carried(chain: Chain, log: Experiment, entry: str, begin: Begin, last: str) 
     ``log`` has both signals. What was longer ago is given by means over longer windows.
     """
     past = begin.samples(log.sample_time)
-    run = Run.of([len(past) + _FIRST], [log.start], log.sample_time, [Begin(begin.levels[:1])])
-    x = np.concatenate([past, np.asarray(log[entry], float)[:_FIRST]])
+    run = Run.of([len(past) + FIRST], [log.start], log.sample_time, [Begin(begin.levels[:1])])
+    x = np.concatenate([past, np.asarray(log[entry], float)[:FIRST]])
     made = chain.run(x, ENTERS[entry], last, run, between_of(chain.rig, entry))
-    off = float(np.mean(np.asarray(log[LEAVES[last]], float)[:_FIRST] - made[-_FIRST:]))
+    off = float(np.mean(np.asarray(log[LEAVES[last]], float)[:FIRST] - made[-FIRST:]))
     means, ago = _in_windows(made[: len(past)] + off, log.sample_time)
     return Begin((float(made[0]), *means), ago, carried=True)
 

@@ -22,7 +22,7 @@ from focgen.arrays import Array
 from focgen.logs.begin import REST, Begin
 from focgen.logs.between import white_level
 from focgen.logs.experiment import Experiment
-from focgen.rig.carried import carried, stretched
+from focgen.rig.carried import FIRST, carried, stretched
 from focgen.rig.effects import Run
 from focgen.rig.engine import Chain, Placed, between_of
 from focgen.rig.response import response_time
@@ -36,7 +36,6 @@ _LEAST = 200  # and samples
 _LONGEST = 20.0  # response times before the first sample: a step is looked for up to here
 _TIMES = 10  # of a step, on the first grid
 _SOONEST = 0.5  # samples before the first: a step as the log begins
-_FIRST = 5  # samples that tell what the input was last, and where the output began
 _ROUNDS = 8  # of Gauss-Newton
 _DAMPED, _STEP = 1e-3, 1e-3  # its damping at first, and its steps for derivatives
 _FALLEN = 1e-4  # of the cost: less is no descent
@@ -128,7 +127,7 @@ def _begun(
 ) -> Experiment:
     if any(begin.known for begin in log.begins.values()):
         return log
-    if len(log) < 2 * _FIRST or not all(np.all(np.isfinite(log[role])) for role in scales.sizes):
+    if len(log) < 2 * FIRST or not all(np.all(np.isfinite(log[role])) for role in scales.sizes):
         return log
     found: dict[str, Begin] = {}
     for entry in entries:
@@ -163,7 +162,7 @@ class _Try:
     @property
     def first(self) -> Array:
         """How far the first samples are off (signals,)."""
-        made: Array = np.abs(self.raw[:_FIRST].mean(axis=0))
+        made: Array = np.abs(self.raw[:FIRST].mean(axis=0))
         return made
 
 
@@ -186,11 +185,11 @@ class _Setting:
         self.units = [scales.sizes[r] for r in self.roles.values()]
         measured = (np.asarray(log[role], float)[:n] for role in self.roles.values())
         self.y = np.stack([y / unit for y, unit in zip(measured, self.units)], axis=1)
-        self.level = float(self.x[0] if entry == "command" else np.mean(self.x[:_FIRST]))
+        self.level = float(self.x[0] if entry == "command" else np.mean(self.x[:FIRST]))
         self.counts = (pace / (pace + np.arange(n) * self.h))[:, None]
         self.asked = _DRIVEN
         if abs(self.level) < _NOTHING * self.reach:
-            self._near_nothing(max(_SHOWN * pace / self.h, 2 * _FIRST))
+            self._near_nothing(max(_SHOWN * pace / self.h, 2 * FIRST))
 
     def _near_nothing(self, least: float) -> None:
         """What counts where the input is 0 at first: its rest there, where that is as long as ``least``."""
@@ -245,7 +244,7 @@ class _Setting:
         """The begin that the data ask for, of all kinds and the ``further`` ones."""
         rest, asked = self.at(REST, 0), self.asked
         noise = np.array([_white(y) for y in self.y.T])
-        moved = rest.first > np.maximum(_APART * noise / np.sqrt(_FIRST), asked.off)
+        moved = rest.first > np.maximum(_APART * noise / np.sqrt(FIRST), asked.off)
         if not moved.any():
             return self._kept(rest)
 
@@ -264,7 +263,7 @@ class _Setting:
     def _kept(self, rest: _Try) -> Begin:
         """The first level held for ever where a log begins near rest: a valve that sticks keeps a little in
         the rig. The rig has to be found where that level holds it: what is off otherwise stays so."""
-        least = _APART * _white(self.x) / np.sqrt(_FIRST)
+        least = _APART * _white(self.x) / np.sqrt(FIRST)
         if self.asked is not _IDLE or abs(self.level) <= max(least, _LITTLE * self.reach):
             return REST
         held = self.at(Begin((self.level,)), 0)

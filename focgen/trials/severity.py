@@ -10,8 +10,8 @@ refitted: the projection off their sensitivities. Those of the actuator (T, alph
 offset, the zero of an integrating one's drive) move freely, gain and times of regulator and sensor by three
 times their uncertainty. Every column may be out of step by half a sample, and read half a per cent of its
 span more or less from one experiment to the next, as loggers and gauges are. Each signal is weighted by its
-noise. *Visible*: in at least one logged signal the
-surviving gap is 0.3 of the noise or more, both root mean square.
+noise. *Visible*: in at least one logged signal the surviving gap is 0.3 of the noise or more, both root mean
+square.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from focgen.arrays import Array
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig.corners import EXACT, moved
 from focgen.rig.rig import UNITY, Actuator, LinearActuator, Relative, Rig
+from focgen.rig.stages import LEAVES
 from focgen.trials.forms import Drawn
 from focgen.trials.machine import Machine, Session, Setting
 
@@ -35,7 +36,6 @@ VISIBLE = 0.3
 _USUAL = 3.0  # times the uncertainty of what was given: as far off is no fault
 _OUT_OF_STEP = 0.5  # of a sample: what a logger leaves open
 _ZERO = 0.005  # of a span: what the zero of a gauge differs by from one experiment to the next
-_SIGNAL_OF = {"regulator": "pressure", "actuator": "curvature", "sensor": "output"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ def rms(values: Array) -> float:
 
 def calibrate(drawn: Drawn, rig: Any, trial: Any, target: float) -> tuple[Setting, float]:
     """The setting whose gap is ``target`` (share of the span), or the form's largest; and the gap it has."""
-    name = _SIGNAL_OF[drawn.stage]
+    name = LEAVES[drawn.stage]
     without = trial.signals(rig)[name]
     span = float(np.ptp(without))
 

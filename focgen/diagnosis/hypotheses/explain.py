@@ -265,17 +265,15 @@ def _unsure(problem: Problem, vector: np.ndarray, unsure: Strays | None) -> tupl
     return carried, noise if np.any(noise) else None
 
 
-def square_told(of: Explanation, fit: Fit, logs: Sequence[Experiment]) -> float:
-    """The mean square that a fit of its segment leaves, made anew, where its experiments begin as in
-    ``logs``."""
+def begun_as(of: Explanation, fit: Fit, logs: Sequence[Experiment]) -> Fit:
+    """A fit of an explained segment, made anew where its experiments begin as in ``logs``."""
     segment = replace(fit.problem.segment, run=run_of(logs, of.segment.entry))
-    return float(np.mean(moved_to(fit, segment, Weighing(of.ar)).weighed ** 2))
+    return moved_to(fit, segment, Weighing(of.ar))
 
 
 def gained(of: Explanation, logs: Sequence[Experiment]) -> float:
     """Nats that an explanation gains, its numbers fitted anew, where its experiments begin as in ``logs``."""
-    segment = replace(of.best.problem.segment, run=run_of(logs, of.segment.entry))
-    return evidence(moved_to(of.best, segment, Weighing(of.ar)), of.best)
+    return evidence(begun_as(of, of.best, logs), of.best)
 
 
 def remembering(of: Explanation) -> Explanation | None:

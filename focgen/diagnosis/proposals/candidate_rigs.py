@@ -16,8 +16,8 @@ from focgen.present import present
 from focgen.rig.effects import Run
 from focgen.rig.engine import Chain
 from focgen.rig.kernels import BALANCED
+from focgen.rig.stages import LEAVES
 
-_ROLES = {"regulator": "pressure", "actuator": "curvature", "sensor": "output"}
 _STEP = 1e-4
 
 
@@ -80,7 +80,7 @@ class CandidateRig:
         for part in (self.part, *self.after):
             x = part.chain().run(x, *part.stages, run, tap=taps)
         return replace(
-            self, run=run, entering=entering, signals={_ROLES[stage]: y for stage, y in taps.items()}
+            self, run=run, entering=entering, signals={LEAVES[stage]: y for stage, y in taps.items()}
         )
 
     @property
@@ -90,7 +90,7 @@ class CandidateRig:
 
     def left_by(self, stage: str | None) -> np.ndarray:
         """What leaves ``stage``, or the segment."""
-        return self.signals[_ROLES[stage or self.part.stages[-1]]]
+        return self.signals[LEAVES[stage or self.part.stages[-1]]]
 
     def slopes(self, stage: str | None) -> list[np.ndarray]:
         """What leaves ``stage`` or the segment by each parameter of the segment."""

@@ -26,11 +26,11 @@ from focgen.rig.engine import Chain
 from focgen.rig.replay import experiments
 from focgen.rig.response import check_bounded, integrations, longest, response_time
 from focgen.rig.rig import Rig
+from focgen.rig.stages import LEAVES
 
 ALIKE = 0.9  # cosine beyond which two effects cannot be told apart
 HIDDEN = 0.1  # surviving share below which an effect hides in the nominal parameters
 _FINE, _LONGEST = 200, 600.0  # samples of a response time, and response times of an experiment of the menu
-_ROLES = {"regulator": "pressure", "actuator": "curvature", "sensor": "output"}
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def _menu(rig: Rig) -> tuple[Experiment, ...]:
         tap: dict[str, np.ndarray] = {}
         Chain(rig).run(choice.input, "regulator", "sensor", run, tap=tap)
         logged = {role for role in ("pressure", "curvature") if getattr(rig.signals, role)} | {"output"}
-        signals = {"command": choice.input} | {_ROLES[s]: y for s, y in tap.items() if _ROLES[s] in logged}
+        signals = {"command": choice.input} | {LEAVES[s]: y for s, y in tap.items() if LEAVES[s] in logged}
         found.append(Experiment(choice.what, choice.limits.h, signals, start))
         start += choice.seconds
     return tuple(found)

@@ -16,7 +16,7 @@ from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, innovations
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import Problem
-from focgen.diagnosis.verdict.instead import Instead, bases, gone, is_likelier, odds_over
+from focgen.diagnosis.verdict.instead import Instead, gone, is_likelier, likeliest, odds_over
 
 _ROUNDS, _ITERATIONS = 6, 6  # of the rate, and of a fit at one
 _SETTLED = 1e-3  # of the sum of squares: less is no descent
@@ -45,8 +45,7 @@ def clocks_apart(e: Explanation) -> Apart | None:
     where nothing was found there, or a rounding."""
     if not e.best.problem.families:
         return None
-    found = [_judged(e, base) for base in bases(e)]
-    return max((apart for apart in found if apart is not None), key=lambda a: a.odds, default=None)
+    return likeliest(e, _judged)
 
 
 def are_apart(e: Explanation) -> bool:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 
@@ -45,6 +46,15 @@ class Instead:
 def is_likelier(other: Instead | None) -> bool:
     """Whether it is likelier than what was found."""
     return other is not None and other.odds > 0.0
+
+
+T = TypeVar("T", bound=Instead)
+
+
+def likeliest(e: Explanation, judged: Callable[[Explanation, Fit], T | None]) -> T | None:
+    """The likeliest of what is ``judged`` beside each of the :func:`bases`; None where nothing is there."""
+    found = [judged(e, base) for base in bases(e)]
+    return max((one for one in found if one is not None), key=lambda one: one.odds, default=None)
 
 
 def bases(e: Explanation) -> Iterator[Fit]:

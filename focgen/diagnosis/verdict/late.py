@@ -16,7 +16,7 @@ import numpy as np
 from focgen.diagnosis.fitting.fit import Fit, Weighing, fit
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.problem.segments import Segment
-from focgen.diagnosis.verdict.instead import Instead, bases, gone, is_likelier, odds_over
+from focgen.diagnosis.verdict.instead import Instead, gone, is_likelier, likeliest, odds_over
 
 _LATEST = 16  # samples
 _ITERATIONS = 6
@@ -44,8 +44,7 @@ def logged_late(e: Explanation) -> Late | None:
     was found there, or a rounding."""
     if e.segment.entry != "command" or not e.best.problem.families:
         return None
-    found = [_judged(e, base) for base in bases(e)]
-    return max((late for late in found if late is not None), key=lambda late: late.odds, default=None)
+    return likeliest(e, _judged)
 
 
 def is_late(e: Explanation) -> bool:

@@ -16,7 +16,7 @@ from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, square_by
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.hypotheses.search import likeliest_on_all
 from focgen.diagnosis.hypotheses.uneven_pace import uneven_paces
-from focgen.diagnosis.verdict.instead import Instead, bases, gone, is_likelier, odds_over
+from focgen.diagnosis.verdict.instead import Instead, gone, is_likelier, likeliest, odds_over
 
 _ITERATIONS = 12
 _AT = {
@@ -52,8 +52,7 @@ def unevenly_paced(e: Explanation) -> Uneven | None:
     there is no pace, or where a rounding was found."""
     if e.segment.pace:
         return None
-    found = [_judged(e, base) for base in bases(e)]
-    return max((one for one in found if one is not None), key=lambda one: one.odds, default=None)
+    return likeliest(e, _judged)
 
 
 def is_uneven(e: Explanation) -> bool:

@@ -47,8 +47,9 @@ def _blurred(y: Array) -> Values | None:
     highest = often[first + int(np.argmax(comb[first : first + _FINE]))]
     near = highest + often[1] * np.linspace(-1.0, 1.0, 4 * _FINE + 1)
     turns = np.array([np.mean(np.exp(2j * np.pi * f * y)) for f in near])
-    step = 1.0 / float(near[int(np.argmax(np.abs(turns)))])
-    phase = step * float(np.angle(turns[int(np.argmax(np.abs(turns)))])) / (2.0 * np.pi)
+    tallest = int(np.argmax(np.abs(turns)))
+    step = 1.0 / float(near[tallest])
+    phase = step * float(np.angle(turns[tallest])) / (2.0 * np.pi)
     return (step, phase) if _jumps(y, step, phase, noise) else None
 
 
