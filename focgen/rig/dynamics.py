@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -167,6 +167,11 @@ class Dynamics:
             usual = getattr(UNCHANGED, name)
             if value is not usual and value != usual:
                 yield name
+
+    def without(self, name: str) -> Dynamics:
+        """The same with this number as in the nominal equation: itself where it is so."""
+        usual = getattr(UNCHANGED, name)
+        return self if getattr(self, name) == usual else replace(self, **{name: usual})
 
     def bending(self, gain: float = 1.0) -> tuple[float, ...]:
         """What the compiled loops know of spring and obstacle, of a plant that answers 1 with ``gain``, of

@@ -124,7 +124,8 @@ class Chain:
                 x = self._once((stage, number), key, x, act, run)
             if tap is not None:
                 tap[stage] = x
-            between = between if self._passes(stage) else Between.STRAIGHT
+            if between != Between.STRAIGHT and not self._passes(stage):
+                between = Between.STRAIGHT
         return x
 
     def _passes(self, stage: str) -> bool:
@@ -262,13 +263,13 @@ def _actuator(
         return [ahead, *drive, _uneven(actuator.dynamics, dynamics.pace, between, delay)]
     if dynamics.lever != SAME and delay:
         return [*_actuator(actuator, here, between, 0.0), _transfer(UNITY, Between.STRAIGHT, delay)]
-    lever, dynamics = dynamics.lever, replace(dynamics, lever=SAME)
+    lever, dynamics = dynamics.lever, dynamics.without("lever")
     if isinstance(actuator, LinearActuator):
         zero = [(("bias", actuator.bias), lambda x, run: actuator.drive(x), None)] if actuator.bias else []
         steps = _levered(_linear(actuator, dynamics, between, delay), actuator, dynamics, lever, between)
         return [*zero, *drive, *weakened(steps, weak, actuator.dynamics.dc_gain)]
     line = (actuator.gain, lambda x, run: actuator.drive(x), None)
-    lag = _lag(1.0, actuator.T, actuator.alpha, replace(dynamics, mass=0.0), delay)
+    lag = _lag(1.0, actuator.T, actuator.alpha, dynamics.without("mass"), delay)
     steps = _levered([lag, *_swung(actuator.T, dynamics.mass)], actuator, dynamics, lever, between)
     return [line, *drive, *weakened(steps, weak, 1.0)]
 
@@ -319,7 +320,7 @@ def _choked(
     actuator: LinearActuator, dynamics: Dynamics, between: Between | bool, delay: float
 ) -> list[Step]:
     """With a highest rate: in the equation of a lag of order 1, beside other changes of that behind it."""
-    others = replace(dynamics, flow=FREE)
+    others = dynamics.without("flow")
     if others.changed <= {"loading", "unloading"}:
         return [_chamber(actuator.dynamics, dynamics, between, delay)]
     behind = _chamber(_AT_ONCE, Dynamics(flow=dynamics.flow), Between.STRAIGHT, 0.0)
@@ -330,7 +331,7 @@ def _massive(
     actuator: LinearActuator, dynamics: Dynamics, between: Between | bool, delay: float
 ) -> list[Step]:
     """With a further mass: of whole orders one more term in the equation, of a fractional lag as of that."""
-    light, of = replace(dynamics, mass=0.0), actuator.dynamics
+    light, of = dynamics.without("mass"), actuator.dynamics
     if plants.plant_of(of) is None:
         _, T, _ = present(linear.single_lag(of))
         return [*_linear(actuator, light, between, delay), *_swung(T, dynamics.mass)]
