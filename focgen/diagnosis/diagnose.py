@@ -38,6 +38,7 @@ from focgen.diagnosis.verdict.evidence import drawn_of
 from focgen.diagnosis.verdict.unexplained import is_noise
 from focgen.errors import FocgenError, LogError
 from focgen.logs.experiment import Experiment
+from focgen.logs.filled import with_readings
 from focgen.logs.read import Logs, each_of
 from focgen.output import check_apart, check_writable
 from focgen.progress import step
@@ -90,6 +91,7 @@ def diagnose(
     session = _usable(experiments(nominal, each, from_, to))
     ran = None if which is None else check_controller(which, session)
     nominal, session = decimated(nominal, session)
+    session = with_readings(session)
     session = begun_session(nominal, session)
     explanations = explain_all(nominal, session, NUMBERS.nats, only, bootstrap)
     nominal = explanations[0].with_intersample(nominal)
@@ -280,10 +282,11 @@ def explain_all(
         found.append(e)
         if exit == roles[-1]:
             break
-        problem, noise = e.best.problem, is_noise(e)
+        problem, noise = e.best.problem.at_every_row, is_noise(e)
+        segment = problem.segment
         made, response = problem.simulate(e.best.vector), problem.references.clocks["response"]
         left = e.predictability.share
-        foretold = predicted(e.segment, segment.y - made, response, left)
+        foretold = predicted(segment, segment.y - made, response, left)
         x = freed(segment, made, foretold, left, noise)
         ways = None
         if is_explained(left, noise):

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from focgen.arrays import Array
+from focgen.arrays import Array, Ints
 from focgen.logs.begin import REST, Begin
 
 ROLES = ("command", "pressure", "curvature", "output", "reference")
@@ -27,7 +27,7 @@ class Experiment:
     ``begins``: by role, what a signal was before the first sample; others were at rest at 0. ``anew``:
     ahead of it the log's clock fell back. ``paused``: how long the rig rested before it is not known, and
     ``start`` is as if no time had passed. ``lasts``: a loop or a play lies where the experiment before left
-    it, and not at 0.
+    it, and not at 0. ``readings``: by role, the rows that hold one, where a logger filled in the others.
     """
 
     name: str
@@ -42,9 +42,11 @@ class Experiment:
     anew: bool = False
     paused: bool = False
     lasts: bool = False
+    readings: Mapping[str, Ints] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "begins", MappingProxyType(dict(self.begins)))
+        object.__setattr__(self, "readings", MappingProxyType(dict(self.readings)))
         object.__setattr__(self, "signals", MappingProxyType(dict(self.signals)))
         if self.rows is not None:
             object.__setattr__(self, "rows", MappingProxyType(dict(self.rows)))
@@ -75,6 +77,10 @@ class Experiment:
         """What the signal of a role was before the first sample."""
         return self.begins.get(role, REST)
 
+    def read(self, role: str) -> Ints | slice:
+        """The rows at which the signal of a role was read: all of them where nothing was filled in."""
+        return self.readings.get(role, slice(None))
+
     @property
     def time(self) -> Array:
         """Seconds since the first sample, shape (n,)."""
@@ -90,7 +96,8 @@ class Experiment:
         time, rows = self._rows_between(lo, hi)
         start = self.start + begin * self.sample_time
         begins = self.begins if begin == 0 else {}
-        return replace(self, signals=cut, start=start, raw_time=time, rows=rows, begins=begins)
+        kept = {} if len(self) > np.sum(keep) else self.readings
+        return replace(self, signals=cut, start=start, raw_time=time, rows=rows, begins=begins, readings=kept)
 
     def _rows_between(self, low: float, high: float) -> tuple[Array | None, Mapping[str, Array] | None]:
         """The raw time stamps and rows from ``low`` to ``high`` (s since the first)."""

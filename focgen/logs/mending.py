@@ -13,7 +13,7 @@ from focgen.logs.clock import HELD, between
 from focgen.logs.drives import Drive
 from focgen.logs.notes import Note
 from focgen.logs.outliers import are_many, first_stands_out, outliers, stand_in, straightened
-from focgen.logs.repeats import fresh_rows, frozen
+from focgen.logs.repeats import dead_band, fresh_rows, frozen
 from focgen.logs.strays import strays
 
 _DRIVES = ("command", "pressure")
@@ -69,6 +69,7 @@ def _mended(role: str, time: Array, y: Array, drive: Drive | None) -> _Signal:
             notes.append(_slow_note(role, slow[0] * len(time) / np.sum(~gone), time))
         here = None if drive is None else drive.of(rows, whole=slow is None)
         straight, off, said = _straightened(role, time[rows], y[rows], here)
+        notes += _band_note(role, y[there])
         if off.any():
             y, wrong = _with(y, rows, straight), np.arange(len(y))[rows][off]
         notes += said
@@ -192,6 +193,15 @@ def _slow_note(role: str, period: float, time: Array) -> str:
     if role == "output":
         done = f"left so, it is {(period - 1) / 2:.2g} samples late on average"
     return f"{role} is fresh in every {period:.3g}. row only ({rate:.3g} Hz): {done}"
+
+
+def _band_note(role: str, y: Array) -> list[str]:
+    """Where a logger reports on change."""
+    band = dead_band(y)
+    if not band:
+        return []
+    what = f"{role} is logged only once it has changed by {band:.2g}"
+    return [f"{what}: log every reading, for a dead band hides what is smaller, and looks like a loop"]
 
 
 def _frozen(time: Array, signals: Mapping[str, _Signal]) -> list[str]:

@@ -11,6 +11,13 @@ _REGULAR = 0.98  # of the gaps between changes agree with one rate
 _SINGLE = 0.8  # of them are one period long: a fresh reading rarely equals the last
 _FINE = 0.5  # of the changes, at most, are the smallest there is: more are a converter's
 _SLOWEST = 50  # rows a reading
+_SELDOM = 0.6  # of all rows, at most, bring a reading that is reported on change
+_SMALLEST = 0.02  # quantile of the changes that stands for the smallest
+_FLOOR = 1.5  # times as large as that one is no more
+_OFTEN = 0.25  # of the changes at least are no larger than that
+_NEW = 0.8  # of the levels at least are new ones: those of a converter come again,
+_COUNTS = 8.0  # and lie apart by more than this part of its changes
+_NEWS = 2e-3  # of the span: smaller changes are of a signal that comes to rest
 _LONG = 20  # rows: a shorter stretch is not called frozen
 _UNUSUAL = 10.0  # times the longest of the usual repetitions
 _MOVES = 0.1  # of its span: by as much another signal moves meanwhile
@@ -23,7 +30,7 @@ def fresh_rows(y: Array) -> tuple[float, Ints] | None:
 
     A coarse converter repeats values as well: its changes come at any row, or nearly all are by one count.
     """
-    changes = _changes(y)
+    changes = changes_of(y)
     if len(changes) < _CHANGES:
         return None
     gaps = np.diff(changes)
@@ -39,8 +46,8 @@ def fresh_rows(y: Array) -> tuple[float, Ints] | None:
     return period, _slots(changes, periods.astype(int), gaps)
 
 
-def _changes(y: Array) -> Ints:
-    """The rows that differ from the one before."""
+def changes_of(y: Array) -> Ints:
+    """The rows of ``y`` (n,) that differ from the one before."""
     rows = np.flatnonzero(y[1:] != y[:-1])
     rows += 1
     return rows
@@ -58,6 +65,19 @@ def _slots(changes: Ints, periods: Ints, gaps: Ints) -> Ints:
     return np.unique(np.concatenate([[0], np.repeat(changes[:-1], periods) + later, changes[-1:]]))
 
 
+def dead_band(y: Array) -> float:
+    """By how much ``y`` (n,) changes at least where a logger reports it on change, in its unit: it repeats a
+    reading until one differs by so much. 0 where it does not. A converter's levels come again and again."""
+    rows = changes_of(y)
+    if not _CHANGES <= len(rows) <= _SELDOM * len(y):
+        return 0.0
+    sizes, levels = np.abs(y[rows] - y[rows - 1]), np.unique(y[rows])
+    least = float(np.quantile(sizes, _SMALLEST))
+    often = np.mean(sizes < _FLOOR * least) > _OFTEN
+    new = len(levels) > _NEW * len(rows) and least > _COUNTS * float(np.min(np.diff(levels)))
+    return least if often and new and least > _NEWS * np.ptp(y) else 0.0
+
+
 def frozen(y: Array, others: list[Array]) -> tuple[int, int] | None:
     """The longest stretch (first row, rows) over which ``y`` (n,) repeats one value, far longer than it
     usually does, while one of ``others`` moves; None where there is none.
@@ -65,7 +85,7 @@ def frozen(y: Array, others: list[Array]) -> tuple[int, int] | None:
     A value at either end of the signal's span is rest or saturation; a converter so coarse that values
     repeat anyway proves nothing.
     """
-    ends = np.concatenate([[0], _changes(y), [len(y)]])
+    ends = np.concatenate([[0], changes_of(y), [len(y)]])
     lengths = np.diff(ends)
     if len(lengths) < _CHANGES:
         return None

@@ -342,7 +342,7 @@ def test_what_the_nominal_chain_is_off_by_is_not_unknown(monkeypatch, explained)
     judged = []
     monkeypatch.setattr(unexplained, "disturbed", judged.append)
     monkeypatch.setattr(unexplained, "_is_disturbed", lambda e, left: e is whole and not explained)
-    whole.converter, whole.segment = None, SimpleNamespace(closed=False)
+    whole.converter, whole.segment = None, SimpleNamespace(closed=False, withheld=0.0)
     whole.predictability = SimpleNamespace(share=0.0)
     for asked in ("from_outside", "another", "is_late", "are_apart", "is_uneven"):
         monkeypatch.setattr(unexplained, asked, lambda e: False)

@@ -289,7 +289,7 @@ def _explained(monkeypatch, ratio, share, left=_STEADY, effects=(), closed=False
     monkeypatch.setattr(unexplained, "is_uneven", lambda e: False)
     nominal, best = (SimpleNamespace(weighed=np.full(4, np.sqrt(v))) for v in (1.0, ratio))
     return SimpleNamespace(
-        segment=SimpleNamespace(pace=0.0, closed=closed),
+        segment=SimpleNamespace(pace=0.0, closed=closed, withheld=0.0),
         converter=None,
         whole=None,
         predictability=SimpleNamespace(share=share),

@@ -252,7 +252,7 @@ def problem_residual(of: Fit) -> np.ndarray:
 def answer(of: Fit, stray: np.ndarray, weighing: Weighing) -> float:
     """The sum of squares, as of innovations, of what a fit's output is another by where its input is another
     by ``stray`` (n,)."""
-    problem, segment = of.problem, replace(of.problem.segment, x=of.problem.segment.x + stray)
+    problem, segment = of.problem, of.problem.segment.anew(x=of.problem.segment.fed.x + stray)
     moved = replace(problem, segment=segment, memory={}).simulate(of.vector)
     off = segment.recent(moved - problem.simulate(of.vector))
     rest = segment.run.rest

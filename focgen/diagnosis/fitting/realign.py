@@ -23,7 +23,7 @@ def realigned(best: Fit, weighing: Weighing) -> Fit:
     found = [best]
     for at, unit in _times(best.problem):
         start = best.vector.copy()
-        start[place], start[at] = 0.0, start[at] + late * best.problem.segment.run.h / unit
+        start[place], start[at] = 0.0, start[at] + late * best.problem.segment.fed.run.h / unit
         if low[at] <= start[at] <= high[at]:
             found.append(fit(best.problem, start, weighing, 6))
     return min(found, key=lambda f: f.cost)

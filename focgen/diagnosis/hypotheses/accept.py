@@ -22,19 +22,22 @@ from focgen.rig.effects import library
 class AcceptanceCriteria:
     """What an effect has to show to be one. ``threshold``: nats of evidence that noise alone does not reach;
     ``carried``: the mean square, as a share of the output's level, of what the output may lack for what its
-    input has lost; ``noise`` (n,): what stays in that of its noise; ``converter``: that hides small ones.
-    ``granted``: it is there, and only its strength is asked."""
+    input has lost; ``noise`` (n,): what stays in that of its noise; ``converter``: that hides small ones, and
+    so does what a logger has ``withheld``, root mean square, as a share of the output's level. ``granted``:
+    it is there, and only its strength is asked."""
 
     threshold: float
     carried: float
     noise: np.ndarray | None
     converter: Converter | None
+    withheld: float = 0.0
     granted: bool = False
 
     @property
     def surroundings(self) -> Surroundings:
         """What makes a misfit beside the forms."""
-        return Surroundings(self.converter.uneven**2 if self.converter else 0.0, self.carried, self.noise)
+        hidden = self.converter.uneven if self.converter else self.withheld
+        return Surroundings(hidden**2, self.carried, self.noise)
 
 
 def select(rankings: Sequence[Ranking], criteria: AcceptanceCriteria) -> Fit | None:

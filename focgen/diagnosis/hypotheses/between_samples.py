@@ -22,7 +22,7 @@ def between_anew(rig: Rig, best: Fit, nominal: Fit, weighing: Weighing) -> tuple
     segment = best.problem.segment
     if rig.between is not None or segment.entry != "command" or not best.problem.candidates:
         return best, nominal
-    others = [replace(segment, between=way) for way in ways(segment) if way != segment.between]
+    others = [segment.anew(between=way) for way in ways(segment) if way != segment.between]
     tried = [moved_to(best, other, weighing) for other in others]
     closest = min([best, *tried], key=lambda f: f.sse)
     if closest.sse > NUMBERS.unlikely * best.sse:

@@ -211,7 +211,8 @@ def _explained(
         candidates, guests, threshold = [c for c in candidates if c.effect in only], [], 0.0
     given, converter = problem.nominal(), converter_of(problem, candidates)
     carried, noise = _unsure(problem, given, unsure)
-    asked = AcceptanceCriteria(threshold, carried, noise, converter, only is not None)
+    withheld, granted = problem.segment.withheld, only is not None
+    asked = AcceptanceCriteria(threshold, carried, noise, converter, withheld, granted)
     rankings, candidates = _grown([], problem, given, candidates, guests, asked)
     rankings = _or_two(rankings, candidates, asked)
     known = [f for r in rankings for f in (r.base, *r.best.values())]
@@ -267,7 +268,7 @@ def _unsure(problem: Problem, vector: np.ndarray, unsure: Strays | None) -> tupl
 
 def begun_as(of: Explanation, fit: Fit, logs: Sequence[Experiment]) -> Fit:
     """A fit of an explained segment, made anew where its experiments begin as in ``logs``."""
-    segment = replace(fit.problem.segment, run=run_of(logs, of.segment.entry))
+    segment = fit.problem.segment.anew(run=run_of(logs, of.segment.entry))
     return moved_to(fit, segment, Weighing(of.ar))
 
 

@@ -76,14 +76,14 @@ def loosened(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Segment:
     """The segment with the ways in which the begins of its experiments may be off."""
     if not segment.run.begins:
         return segment
-    columns = []
+    columns, fed = [], segment.fed
     past = memory(rig, logs) if any(log.paused for log in logs) else 0.0
-    for number, ((first, last), begin) in enumerate(zip(segment.run.spans, segment.run.begins)):
-        for way in () if begin.at_rest else _ways(rig, segment, logs[: number + 1], past):
-            column = np.zeros(len(segment.x))
+    for number, ((first, last), begin) in enumerate(zip(fed.run.spans, fed.run.begins)):
+        for way in () if begin.at_rest else _ways(rig, fed, logs[: number + 1], past):
+            column = np.zeros(len(fed.x))
             column[first:last] = way
             columns.append(column)
-    return replace(segment, loose=np.stack(columns, axis=1)) if columns else segment
+    return segment.anew(loose=np.stack(columns, axis=1)) if columns else segment
 
 
 def _ways(rig: Rig, segment: Segment, logs: Sequence[Experiment], past: float) -> np.ndarray:

@@ -26,6 +26,7 @@ def input_covariance(e: Explanation) -> np.ndarray:
     rows = jacobian(problem, vector, now, weighing, low, high)[:-1]  # the fit's own are of an earlier vector
     variance = float(np.mean(now**2))
     spread = _spread(products(rows) + variance * np.diag(problem.known[1]), variance)
+    problem = problem.at_every_row
     made = problem.simulate(vector)
     moved = [problem.simulate(vector + STEP * problem.level(direction)) - made for direction in spread.T]
     ways = np.stack(moved, axis=1) / STEP

@@ -45,7 +45,7 @@ def problem_of(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Proble
     freely = owner(rig) if owner(rig) in segment.stages else None
     load, response = (scales.levels["load"], scales.levels["response"])
     segment = replace(segment, pace=pace(rig, segment.stages, scales.clocks["response"]))
-    slack = min(1.0, _OUT_OF_STEP * scales.clocks["response"] / segment.run.h)
+    slack = min(1.0, _OUT_OF_STEP * scales.clocks["response"] / segment.fed.run.h)
     return Problem(
         segment, NominalParameters(rig, segment.stages, freely, load, response), scales, slack=slack
     )
@@ -57,7 +57,7 @@ def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
     tried = [segment.between] if segment.entry != "command" else ways(segment)
     if rig.between is not None:
         tried = [rig.between]
-    problems = [problem_of(rig, replace(segment, between=way), logs) for way in tried]
+    problems = [problem_of(rig, segment.anew(between=way), logs) for way in tried]
     if len(problems) == 1:
         return problems[0]
     *plain, last = [fit(p, p.nominal(), WHITE, 6) for p in problems]
@@ -69,7 +69,7 @@ def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
 
 def ways(segment: Segment) -> list[Between]:
     """What a command may do between its samples."""
-    rests = np.mean(np.diff(segment.x) == 0.0) > _RESTS
+    rests = np.mean(np.diff(segment.fed.x) == 0.0) > _RESTS
     return [way for way in _WAYS if not (rests and way == Between.SMOOTH)]
 
 
@@ -84,10 +84,11 @@ def _zeroed(problem: Problem) -> Problem:
 def _paced(problem: Problem) -> Problem:
     """The problem with a pace that depends on the level, as much as the pace itself may be off, where that is
     all there is. Where errors add up there is no pace."""
-    column = None if problem.segment.pace else level_pace(problem.nominals.rig, problem.segment)
+    column = None if problem.segment.pace else level_pace(problem.nominals.rig, problem.segment.fed)
     if column is None:
         return problem
-    segment = replace(problem.segment, loose=np.column_stack([problem.segment.loose, column]), paced=True)
+    segment = problem.segment
+    segment = segment.anew(loose=np.column_stack([segment.fed.loose, column]), paced=True)
     return _where_all(problem, replace(problem, segment=segment, memory={}))
 
 

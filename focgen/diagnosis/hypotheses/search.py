@@ -125,8 +125,10 @@ def _in_steps(problem: Problem) -> bool:
 
 
 def coarseness(problem: Problem) -> int:
-    """How many neighbouring samples a coarse pass takes the mean of."""
+    """How many neighbouring samples a coarse pass takes the mean of: of seldom readings none."""
     segment = problem.segment
+    if segment.whole:
+        return 1
     shortest = min(last - first for first, last in segment.run.spans)
     seen = int(problem.references.clocks["response"] / segment.run.h / _QUICKEST)
     return max(1, min(len(segment.y) // _COARSE, shortest // 20, seen))

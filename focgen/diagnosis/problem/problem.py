@@ -122,6 +122,12 @@ class Problem:
         bent = any(c.family and c.family.bends for c in candidates)
         return replace(self, candidates=tuple(candidates), nominals=replace(self.nominals, bent=bent))
 
+    @property
+    def at_every_row(self) -> Problem:
+        """The same at the rows that a logger filled in, too."""
+        whole = self.segment.whole
+        return replace(self, segment=replace(whole, pace=self.segment.pace), memory={}) if whole else self
+
     def thinned(self, factor: int) -> Problem:
         """The same on means of ``factor`` samples at a time."""
         return replace(self, segment=self.segment.thinned(factor), memory={}, slack=self.slack / factor)
@@ -236,8 +242,9 @@ class Problem:
         own, segment = len(self.nominal_start), self.segment
         gauges, off, begun, zeros = self._parted(vector[own + 1 : self.head])
         x = self._entered(float(vector[own]), off, probe)
-        made = chain.run(x, segment.stages[0], segment.stages[-1], segment.run, segment.between)
-        made = self._read(made, *gauges)
+        fed = segment.fed
+        made = chain.run(x, segment.stages[0], segment.stages[-1], fed.run, segment.between)
+        made = self._read(made if segment.readings is None else made[segment.readings], *gauges)
         made = made + segment.loose @ begun if len(begun) and begun.any() else made
         return made + self._uneven(zeros) if len(zeros) and zeros.any() else made
 
@@ -273,7 +280,7 @@ class Problem:
         nothing changed, by which a chain remembers what it made of it."""
         key = (shift, *off.tolist())
         if not any(key):
-            return self.segment.bent
+            return self.segment.fed.bent
         kept: list[tuple[tuple[float, ...], np.ndarray]] = self.memory.setdefault("entered", [])
         for old, y in kept:
             if old == key:
@@ -286,9 +293,10 @@ class Problem:
         return made
 
     def _moved(self, shift: float, off: np.ndarray) -> np.ndarray:
-        x = self.segment.bent
-        x = x + abs(shift) * self.segment.moves[shift < 0] if shift else x
-        return x + self.segment.input_modes @ off if off.any() else x
+        fed = self.segment.fed
+        x = fed.bent
+        x = x + abs(shift) * fed.moves[shift < 0] if shift else x
+        return x + fed.input_modes @ off if off.any() else x
 
     def _beside(self, near: tuple[tuple[float, ...], np.ndarray], key: tuple[float, ...]) -> np.ndarray:
         """The same from what it is ``near``, where but one number is another: a way alone is quicker than
@@ -297,7 +305,7 @@ class Problem:
         if len(others) > 1 or (0 in others and old[0] * key[0] <= 0.0):
             return self._moved(key[0], np.array(key[1:]))
         for i in others:
-            way = self.segment.input_modes[:, i - 1] if i else self.segment.moves[key[0] < 0]
+            way = self.segment.fed.input_modes[:, i - 1] if i else self.segment.fed.moves[key[0] < 0]
             made = made + (abs(key[i]) - abs(old[i]) if i == 0 else key[i] - old[i]) * way
         return made
 

@@ -23,7 +23,7 @@ def _levels(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> dict[str,
     """Measured where logged, else what the rig as given makes of the input; what leaves the actuator, else
     what the sensor must have read: a reading that stops stays below what the rig as given would reach."""
     taps: dict[str, np.ndarray] = {}
-    Chain(rig).run(segment.x, segment.stages[0], segment.stages[-1], segment.run, tap=taps)
+    Chain(rig).run(segment.fed.x, segment.stages[0], segment.stages[-1], segment.fed.run, tap=taps)
     made = {stage: _largest([part]) for stage, part in taps.items()}
     for stage, role in (("regulator", "pressure"), ("actuator", "curvature"), ("sensor", "output")):
         if all(role in log for log in logs):

@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
+from focgen.arrays import Ints
+from focgen.diagnosis.numbers import NUMBERS
 from focgen.logs.between import Between, white_level
 from focgen.logs.experiment import Experiment
+from focgen.logs.repeats import dead_band
 from focgen.rig import kernels
 from focgen.rig.effects import Run
 from focgen.rig.rig import UNITY, Rig
@@ -34,7 +38,9 @@ class Segment:
     off, a standard deviation each. ``loose`` (n, k): what the output would be off by, were experiments to
     begin a little otherwise than ``run`` says, in the output's unit; the last of it, where a stage is
     ``paced`` otherwise at other levels, what that makes. ``pace``: s after which an error no
-    longer counts, of a rig that integrates; 0: none is forgotten.
+    longer counts, of a rig that integrates; 0: none is forgotten. ``whole``: where a logger filled rows in,
+    the segment at every row, at which its input comes; the one itself has the ``readings`` (n,) of it alone.
+    ``band``: by how much the output has to change to be logged, in its unit, 0 where all of it is.
     """
 
     entry: str
@@ -54,6 +60,34 @@ class Segment:
     pace: float = 0.0
     paced: bool = False
     wanted: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    whole: Segment | None = None
+    readings: Ints | None = None
+    band: float = 0.0
+
+    @property
+    def fed(self) -> Segment:
+        """The segment at every row at which its input comes."""
+        return self.whole or self
+
+    def anew(self, **changes: Any) -> Segment:
+        """The same with ``changes`` of what it is at every row."""
+        if self.whole is None or self.readings is None:
+            return replace(self, **changes)
+        whole = replace(self.whole, **changes)
+        read = whole.read_at(self.readings)
+        return replace(self, whole=whole, **{name: getattr(read, name) for name in changes})
+
+    def read_at(self, rows: Ints) -> Segment:
+        """The same whose output was read at these ``rows`` alone, the first of each experiment among them."""
+        run = self.run
+        h = run.h * len(run.rest) / len(run.rest[rows])
+        seldom = replace(run, h=h, rest=run.rest[rows], clock=run.clock[rows])
+        x, y, trust, asked, modes, loose = (
+            v[rows] for v in (self.x, self.y, self.trust, self.asked, self.input_modes, self.loose)
+        )
+        read = replace(self, x=x, y=y, trust=trust, asked=asked, input_modes=modes, loose=loose, run=seldom)
+        wanted = self.wanted[rows] if len(self.wanted) else self.wanted
+        return replace(read, wanted=wanted, whole=self, readings=rows)
 
     @cached_property
     def level_in(self) -> float:
@@ -69,6 +103,11 @@ class Segment:
     def level_out(self) -> float:
         """The largest magnitude of the output, in its unit."""
         return float(np.max(np.abs(self.y))) or 1.0
+
+    @property
+    def withheld(self) -> float:
+        """Root mean square, as a share of the output's level, of what a dead band may have kept back."""
+        return NUMBERS.uneven * self.band / self.level_out
 
     @cached_property
     def weight(self) -> np.ndarray:
@@ -93,9 +132,9 @@ class Segment:
 
     def thinned(self, factor: int) -> Segment:
         """The same in means of ``factor`` samples at a time, for a rough run; what does not fill the last of
-        an experiment is left out."""
-        if factor == 1:
-            return replace(self, run=replace(self.run, rough=True))
+        an experiment is left out. One that was read at some rows only stays as it is."""
+        if factor == 1 or self.whole:
+            return self.anew(run=replace(self.fed.run, rough=True))
         counts = [(last - first) // factor for first, last in self.run.spans]
         kept = np.concatenate(
             [first + np.arange(n * factor) for (first, _), n in zip(self.run.spans, counts)]
@@ -164,7 +203,7 @@ def make(
     led = [exit == "output" and _is_led(log) for log in logs]
     closed = [_is_closed(log) for log in logs]
     trust = np.concatenate([_trust(np.asarray(log[exit], float), _unsteadiness(log)) for log in logs])
-    return Segment(
+    whole = Segment(
         entry,
         exit,
         between(entry, exit),
@@ -180,7 +219,17 @@ def make(
         input_modes[:, _felt(input_modes, x, y)],
         np.zeros((len(x), 0)),
         wanted=_asked(logs, x, closed) if any(closed) else np.zeros(0),
+        band=dead_band(y),
     )
+    rows = _readings(logs, exit)
+    return whole if rows is None else whole.read_at(rows)
+
+
+def _readings(logs: Sequence[Experiment], role: str) -> Ints | None:
+    """The session's rows that hold a reading, where a logger filled in others."""
+    firsts = np.cumsum([0, *(len(log) for log in logs)])
+    parts = [first + log.readings[role] for first, log in zip(firsts, logs) if role in log.readings]
+    return np.concatenate(parts) if len(parts) == len(logs) else None
 
 
 def _felt(input_modes: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:

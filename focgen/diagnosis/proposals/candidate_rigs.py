@@ -35,7 +35,7 @@ class Part:
         """The segment as fitted, after the session."""
         problem = fit.problem
         left: list[dict[str, float]] = []
-        segment = problem.segment
+        segment = problem.segment.fed
         chain = Chain(problem.rig(fit.vector), problem.placed(fit.vector))
         chain.run(segment.x, segment.stages[0], segment.stages[-1], segment.run, segment.between, left=left)
         return cls(problem, fit.vector, left)

@@ -56,7 +56,7 @@ def are_apart(e: Explanation) -> bool:
 def _judged(e: Explanation, base: Fit) -> Apart | None:
     """The likeliest rate beside what ``base`` has, None where another clock helps it nothing."""
     clock, rate, best = e.segment.run.clock, 0.0, base
-    step = 2.0 * e.segment.run.h / float(np.ptp(clock))  # a sample sooner and later at the session's ends
+    step = 2.0 * e.segment.fed.run.h / float(np.ptp(clock))  # a sample sooner and later at the session's ends
     for _ in range(_ROUNDS):
         asked = _asked(best, base.problem, rate, step, Weighing(e.ar))
         if not asked:
@@ -83,9 +83,9 @@ def _asked(of: Fit, problem: Problem, rate: float, step: float, weighing: Weighi
 
 def _paced(problem: Problem, rate: float) -> Problem:
     """The problem with its input on a clock that gains a part ``rate``, right in the session's middle."""
-    segment = problem.segment
+    segment = problem.segment.fed
     clock = segment.run.clock
     sooner = clock + rate * (clock - 0.5 * (clock[0] + clock[-1]))
     parts = zip(segment.parts(sooner), segment.parts(clock), segment.parts(segment.x))
     x = np.concatenate([np.interp(at, t, x) for at, t, x in parts])
-    return replace(problem, segment=replace(segment, x=x), memory={})
+    return replace(problem, segment=problem.segment.anew(x=x), memory={})

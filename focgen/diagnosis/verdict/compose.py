@@ -110,5 +110,6 @@ def mean_square(logs: Sequence[Experiment], made: Sequence[dict[str, np.ndarray]
 
 
 def squares(logs: Sequence[Experiment], made: Sequence[dict[str, np.ndarray]]) -> np.ndarray:
-    """The output's mean square error of every experiment."""
-    return np.array([np.mean((log["output"] - m["output"]) ** 2) for log, m in zip(logs, made)])
+    """The output's mean square error of every experiment, where it was read."""
+    errors = [(log["output"] - m["output"])[log.read("output")] for log, m in zip(logs, made)]
+    return np.array([np.mean(error**2) for error in errors])

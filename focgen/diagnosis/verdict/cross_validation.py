@@ -27,7 +27,8 @@ def cross_validated(rig: Rig, logs: Sequence[Experiment], explanations: Sequence
         simulated = np.concatenate([m["output"] for m in made])
         error[fold == part] = (measured - simulated)[fold == part]
     ends = np.cumsum([len(log) for log in logs])[:-1]
-    return np.array([np.mean(part**2) for part in np.split(error, ends)])
+    read = [part[log.read("output")] for log, part in zip(logs, np.split(error, ends))]
+    return np.array([np.mean(part**2) for part in read])
 
 
 def cross_validated_share(e: Explanation) -> float:
@@ -43,4 +44,5 @@ def _without(e: Explanation, seen: np.ndarray) -> Explanation:
     """The explanation with its fit made to the samples ``seen`` (n,) only."""
     if not e.best.problem.candidates:
         return e
-    return replace(e, best=fitted_to(e.best, Weighing(e.ar), seen))
+    rows = e.segment.readings
+    return replace(e, best=fitted_to(e.best, Weighing(e.ar), seen if rows is None else seen[rows]))

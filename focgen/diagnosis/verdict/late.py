@@ -62,7 +62,7 @@ def _judged(e: Explanation, base: Fit) -> Late | None:
     if not samples:
         return None
     odds = odds_over(e, base, best.sse, 1)
-    return Late(gone(e, base), odds, samples, samples * e.segment.run.h)
+    return Late(gone(e, base), odds, samples, samples * e.segment.fed.run.h)
 
 
 def _earlier(base: Fit, weighing: Weighing) -> Iterator[tuple[int, Fit]]:
@@ -70,7 +70,7 @@ def _earlier(base: Fit, weighing: Weighing) -> Iterator[tuple[int, Fit]]:
     start = base.vector.copy()
     start[len(base.problem.nominal_start)] = 0.0  # an alignment that made up for a part of it
     for n in range(1, _LATEST + 1):
-        segment = replace(base.problem.segment, x=_sooner(base.problem.segment, n))
+        segment = base.problem.segment.anew(x=_sooner(base.problem.segment.fed, n))
         tried = fit(replace(base.problem, segment=segment, memory={}), start, weighing, _ITERATIONS)
         yield n, tried
         start = tried.vector

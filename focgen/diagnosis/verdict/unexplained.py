@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from focgen.diagnosis.belief.unknown import is_none
-from focgen.diagnosis.hypotheses.converter import is_rounded
+from focgen.diagnosis.hypotheses.converter import is_rounded, rms
 from focgen.diagnosis.hypotheses.disturbance import Disturbance, disturbance
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.numbers import NUMBERS
@@ -21,10 +21,12 @@ def is_unknown(e: Explanation) -> bool:
     """Whether much of what inputs predict of the nominal residual is still there after the effects, or what
     hardly any of them explains is not just noise, or what moves with time moves at once, or the command was
     logged late, columns go by clocks of their own or a pace is uneven instead; unless a coarse converter
-    explains it, or the nominal chain that is off by itself does."""
+    or a logger's dead band explains it, or the nominal chain that is off by itself does."""
     if e.whole is not None and not e.causes:
         return is_unknown(e.whole)
     if e.converter is not None and e.converter.explains(e.best):
+        return False
+    if not e.causes and rms(e.best.weighed) < e.segment.withheld:
         return False
     left = disturbed(e)
     if _is_disturbed(e, left) or (e.segment.closed and _hidden(e, left)):

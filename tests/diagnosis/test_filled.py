@@ -1,0 +1,69 @@
+"""Signals of which a logger has filled rows in, or which it reports on change.
+
+Red when a logger's doing stands for an effect of the rig or shuts the diagnosis, or when it hides an effect
+that its readings show.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from focgen.diagnosis.diagnose import diagnose
+from tests.diagnosis_rig import RIG, session
+from tests.logs.test_filled import drawn, held, reported
+
+ALL = ("pressure", "curvature", "output")
+
+
+def logged(logs, fill, roles=ALL):
+    """The logs with every signal of ``roles`` as a logger fills it in."""
+    spans = {role: np.ptp(np.concatenate([log[role] for log in logs])) for role in roles if role in logs[0]}
+    return [
+        replace(log, signals={**log.signals, **{r: fill(log[r], span) for r, span in spans.items()}})
+        for log in logs
+    ]
+
+
+def every(k, fill):
+    """Each signal read in every ``k``-th row."""
+    return lambda y, span: fill(y, np.arange(0, len(y), k))
+
+
+def on_change(share):
+    """Each reported once it has changed by this share of its span."""
+    return lambda y, span: reported(y, share * span)
+
+
+@pytest.mark.parametrize(
+    "fill, roles, left",
+    [
+        (every(10, held), ("output",), 1.25),
+        (every(6, drawn), ("curvature", "output"), 1.25),
+        pytest.param(every(10, held), (), 1.25, marks=pytest.mark.long),
+        pytest.param(every(10, drawn), ALL, 1.25, marks=pytest.mark.long),
+        (on_change(0.03), ("output",), 3.0),
+        pytest.param(on_change(0.06), ("output",), 3.0, marks=pytest.mark.long),
+    ],
+)
+def test_what_a_logger_fills_in_is_no_effect(fill, roles, left):
+    """``left``: times the noise, at most; no ``roles``: command and output alone are logged."""
+    kept = ("pressure", "curvature") if roles else ()
+    found = diagnose(RIG, logged(session(3, roles=kept), fill, roles or ("output",)), pictures=False)
+    assert found.verdict in ("none", "parameters")
+    assert found.gap.refitted < left * found.gap.floor
+
+
+@pytest.mark.parametrize(
+    "fill, effect, named",
+    [
+        (every(8, held), {"slip": 0.6}, "hysteresis"),
+        pytest.param(every(8, drawn), {"vent": 0.8}, "valve_asymmetry", marks=pytest.mark.long),
+        pytest.param(every(6, held), {"delay": 6}, "transport_delay", marks=pytest.mark.long),
+        pytest.param(on_change(0.01), {"bend": 15.0}, "sensor_nonlinearity", marks=pytest.mark.long),
+    ],
+)
+def test_an_effect_is_found_by_the_readings(fill, effect, named):
+    found = diagnose(RIG, logged(session(4, **effect), fill), pictures=False)
+    (cause,) = found.causes
+    assert cause.candidates[0].effect == named
