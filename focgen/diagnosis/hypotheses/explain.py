@@ -335,7 +335,7 @@ def _widened_beside(best: Fit, threshold: float) -> Fit:
     known = problem.nominals.precision > 0.0
     moved = np.abs(then.vector[: len(known)] - problem.nominal_start)[known]
     away = moved * np.sqrt(problem.nominals.precision[known])
-    return then if evidence(then, now) > threshold and np.max(away) < _BELIEVED else best
+    return then if evidence(then, now) > threshold and np.max(away, initial=0.0) < _BELIEVED else best
 
 
 def _worth_trying(
