@@ -77,13 +77,16 @@ def _levered(actuator: Actuator | LinearActuator) -> frozenset[str]:
 
 def _changeable(actuator: Actuator | LinearActuator) -> frozenset[str]:
     """What effects may change of an actuator's own equation: all of a single lag's but a hysteretic spring; a
-    spring that bends where there is one; dry friction on what moves; of a mass on a spring also a hysteretic
+    spring that bends where there is one; dry friction on what moves, or yields as a spring beside dampers
+    does; of a mass on a spring also a hysteretic
     one, an obstacle, a preload, its damper and its mass; of what else is a sum of lags, the pace each way."""
     lag = None if isinstance(actuator, Actuator) else linear.single_lag(actuator.dynamics)
     if isinstance(actuator, Actuator) or lag:
         return _OF_LAGS | ({"flow"} if lag and lag[2] == 1.0 else set())
     plant = plants.plant_of(actuator.dynamics)
     found = {"bend"} if linear.is_spring(actuator.dynamics) else set()
+    if plant is None and linear.is_damped(actuator.dynamics):
+        found |= {"drag"}
     if plant is None and lags.is_sum_of_lags(actuator.dynamics):
         found |= {"loading", "unloading"}
     if plant is not None:

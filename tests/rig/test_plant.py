@@ -206,6 +206,32 @@ def test_first_order_friction_is_the_same_by_both_ways():
     np.testing.assert_allclose(made, exact, atol=2e-3)
 
 
+@pytest.mark.parametrize("form, values", [("coulomb", (0.15,)), ("breakaway", (0.15, 0.1))])
+def test_friction_of_a_spring_beside_dampers_holds_it_while_they_relax(form, values):
+    """A dashpot, a spring and one more behind a dashpot of its own, in fine Euler steps of the forces."""
+    D, k, soft, tau, h = 1.3, 1.0, 2.0, 1.5, 0.01
+    t = np.arange(2000) * h
+    u = 1.0 - np.cos(0.6 * t) + 0.3 * np.sin(3.1 * t)
+    y, z, moving, made = 0.0, 0.0, False, [0.0]
+    for i in range(1, len(u)):
+        for j in range(100):
+            push = u[i - 1] + (u[i] - u[i - 1]) * (j + 0.5) / 100 - k * y - soft * (y - z)
+            speed = (
+                (push - np.sign(push) * values[0]) / D
+                if abs(push) > (values[0] if moving else sum(values))
+                else 0.0
+            )
+            moving, y, z = speed != 0.0, y + h / 100 * speed, z + h / 100 * (y - z) / tau
+        made.append(y)
+    den = [(D * tau, 2.0), (D + k * tau + soft * tau, 1.0), (k, 0.0)]
+    rig = Rig("a", h, AXIS.signals, LinearActuator(TransferFunction([(tau, 1.0), (1.0, 0.0)], den)))
+    placed = (Placed("friction", form_of("friction", form), "actuator", values),)
+    assert fits_in(placed[0].form, "actuator", rig)
+    found = Chain(rig, placed).run(u, "regulator", "sensor", Run.of([len(u)], [0.0], h))
+    np.testing.assert_allclose(found, made, atol=1e-3 * np.ptp(made))
+    assert np.max(np.abs(Chain(rig).run(u, "regulator", "sensor", Run.of([len(u)], [0.0], h)) - made)) > 0.05
+
+
 def test_a_smooth_input_is_taken_as_smooth():
     """The steady response to a sine of ten samples a period is the transfer function's, to 1e-5; in straight
     lines it is 3 % off."""

@@ -13,6 +13,7 @@ from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.verdict.confidence import nominal_instead
 from focgen.diagnosis.verdict.predicted_improvement import paths
 from focgen.diagnosis.verdict.summary import Summary, doubts
+from focgen.diagnosis.verdict.unexplained import disturbed, is_driven
 
 _NEAR = 0.95  # of the error without any effect: with more a family is not near
 
@@ -47,12 +48,19 @@ def lesser(causes: Sequence[tuple[Explanation, Cause]]) -> Iterator[str]:
 
 
 def the_rest(summary: Summary) -> Iterator[str]:
-    """Where what was found closes less of the gap than it leaves above the noise."""
+    """Where what was found closes less of the gap than it leaves above the noise, or leaves what else drives
+    the rig."""
     if summary.stands_for_more:
         yield (
             "what was found closes less than half of the gap, and the error stays "
             f"{summary.loudness:.1f} times the noise: something else is missing, which it may stand for"
         )
+    for e in dict.fromkeys(e for e, _ in summary.causes):
+        if is_driven(e):
+            yield (
+                f"{_within(e)}: what is left has passed through the rig, {disturbed(e).above:.1f} times "
+                "what is quick in it, and no input predicts it: something else acts there, which it may stand for"
+            )
 
 
 def _within(e: Explanation) -> str:

@@ -51,6 +51,15 @@ def disturbed(e: Explanation) -> Disturbance:
     return disturbance(e.segment.parts(e.best.weighed), e.segment.run.h, response)
 
 
+def is_driven(e: Explanation) -> bool:
+    """Whether what effects leave of a segment has passed through the rig, far above its noise, and inputs
+    predict little of it: something else acts there. What goes round in a loop, or adds up, is left so by
+    noise."""
+    if not e.causes or e.segment.closed or e.segment.pace or is_rounded(e.causes):
+        return False
+    return e.predictability.share < NUMBERS.left and disturbed(e).pushed
+
+
 def is_noise(e: Explanation) -> bool:
     """Whether what a segment leaves is noise, but for a little that its input predicts."""
     left = disturbed(e)
