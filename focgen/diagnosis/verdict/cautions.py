@@ -58,8 +58,8 @@ def the_rest(summary: Summary) -> Iterator[str]:
     for e in dict.fromkeys(e for e, _ in summary.causes):
         if is_driven(e):
             yield (
-                f"{_within(e)}: what is left has passed through the rig, {disturbed(e).above:.1f} times what is "
-                "quick in it, and no input predicts it: something else acts there, which it may stand for"
+                f"{_within(e)}: what is left has passed through the rig, {disturbed(e).above:.1f} times what "
+                "is quick in it, and no input predicts it: something else acts there, which it may stand for"
             )
 
 
