@@ -28,6 +28,7 @@ CONSTANTS = {
     "hypotheses/nuisances.py": ["_GAUGE", "_OUT_OF_STEP", "_SMOOTHER"],
     "hypotheses/rivals.py": ["_NEAR"],
     "hypotheses/search.py": ["_ADRIFT", "_BENT", "_FAR", "_NEAR", "_QUICK", "_QUICKEST"],
+    "hypotheses/seen_through.py": ["_AS_WELL", "_FINELY"],
     "hypotheses/uneven_pace.py": ["_RATE"],
     "problem/decimate.py": ["_WITHIN"],
     "problem/excitation.py": ["_STEADY"],

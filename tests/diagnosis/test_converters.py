@@ -252,3 +252,37 @@ def test_a_rounding_is_part_of_the_rig_only_where_users_see_it_come_closer(monke
     best, (cause,) = found.beside(nominal, nominal, (), None)
     assert (best is both) == part
     assert cause.rivals[0].effect == "sensor_quantization"
+
+
+def late(y, step, lag):
+    """``y`` (n,) read in steps that go on ``lag`` of a step late, on either way."""
+    read, level = np.empty_like(y), 0.0
+    for i, value in enumerate(y / step):
+        level = np.round(value) if abs(value - level) > 0.5 + lag else level
+        read[i] = step * level
+    return read
+
+
+@pytest.mark.parametrize("lag, seed", [(0.15, 1), (0.3, 2), pytest.param(0.2, 3, marks=pytest.mark.long)])
+def test_steps_that_go_on_late_are_no_loop_beside_them(lag, seed):
+    rng, logs = np.random.default_rng(seed), session(0.5, 0.0, seed)
+    for i, log in enumerate(logs):
+        read = late(answered(log["command"]) + 0.03 * rng.normal(size=len(log)), 1.2, lag)
+        logs[i] = replace(log, signals={**log.signals, "output": read})
+    found = diagnose(HEATER, logs, pictures=False)
+    (cause,) = found.causes
+    assert cause.candidates[0].effect == "sensor_quantization"
+
+
+@pytest.mark.parametrize("step", [1.2, pytest.param(0.8, marks=pytest.mark.long)])
+def test_a_loop_wider_than_a_step_stays_beside_it(step):
+    rng, logs = np.random.default_rng(5), session(0.5, 0.0, 5)
+    for i, log in enumerate(logs):
+        y, reading, loop = answered(log["command"]), 0.0, np.empty(len(log))
+        for k, value in enumerate(y):  # a play of 1.5 steps either way
+            reading = min(max(reading, value - 1.5 * step), value + 1.5 * step)
+            loop[k] = reading
+        read = step * np.round((loop + 0.03 * rng.normal(size=len(log))) / step)
+        logs[i] = replace(log, signals={**log.signals, "output": read})
+    names = {cause.candidates[0].effect for cause in diagnose(HEATER, logs, pictures=False).causes}
+    assert names & {"hysteresis", "sensor_hysteresis"}

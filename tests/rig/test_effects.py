@@ -49,7 +49,7 @@ def test_an_effect_says_what_it_is(name):
     assert effect.stage in STAGES
     assert len(effect.meaning) > 10 and len(effect.reveals) > 10
     assert effect.confused_with and set(effect.confused_with) <= set(NAMES) - {name}
-    exact = effect.delays or effect.rounds  # nature has one form of these, and none quite of any other
+    exact = effect.delays  # nature has one form of these, and none quite of any other
     assert len(effect.forms) == 1 if exact else len(effect.forms) >= 2
     assert len({f.name for f in effect.forms}) == len(effect.forms)
 

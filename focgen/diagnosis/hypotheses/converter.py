@@ -17,7 +17,8 @@ from focgen.diagnosis.fitting.fit import FIXED, WHITE, Fit, Weighing, fit, probl
 from focgen.diagnosis.hypotheses.rivals import Cause, Rival, share_of
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
-from focgen.rig.effects import library
+from focgen.rig import kernels
+from focgen.rig.effects import form_of, library
 from focgen.rig.effects._effect import Run, Values
 from focgen.rig.engine import slot_in
 
@@ -46,6 +47,12 @@ class Converter:
     def left(self) -> float:
         """The same where the steps are simulated."""
         return NUMBERS.stepped * self.step
+
+    def sluggish(self, lag: float) -> Converter:
+        """The same with levels that go on ``lag`` of a step late, on either way."""
+        form = form_of(self.candidate.effect, "sluggish")
+        entries = (*self.entries, lag)
+        return Converter(_held(replace(self.candidate, form=form), entries), entries, self.step)
 
     def explains(self, of: Fit) -> bool:
         """Whether the residual is no larger than what a converter's steps leave."""
@@ -99,8 +106,10 @@ def is_rounded(causes: Sequence[Cause]) -> bool:
 
 
 def _eased(width: float, x: np.ndarray, values: Values, run: Run) -> np.ndarray:
-    """Steps of ``values`` (step, phase), each risen in a part ``width`` of it, by a hyperbolic tangent."""
-    step, phase = values
+    """Steps of ``values`` (step, phase and, of sluggish ones, lag), each risen in a part ``width`` of it, by
+    a hyperbolic tangent."""
+    step, phase, *lag = values
+    x = kernels.play(x, run.rest, lag[0] * step) if lag else x
     whole = np.floor((x - phase) / step)
     part = (x - phase) / step - whole
     risen = np.tanh((part - 0.5) / width) / np.tanh(0.5 / width)

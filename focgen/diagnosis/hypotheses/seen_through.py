@@ -9,17 +9,22 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from scipy.optimize import minimize_scalar
+
 from focgen.diagnosis.belief.choice import rarity
 from focgen.diagnosis.belief.further import Ground
 from focgen.diagnosis.belief.standing import behind, holds
 from focgen.diagnosis.fitting.fit import WHITE, Fit, fit
 from focgen.diagnosis.hypotheses.accept import AcceptanceCriteria
-from focgen.diagnosis.hypotheses.converter import Converter
-from focgen.diagnosis.hypotheses.rivals import Beside, Cause, Rival, alike, change_of, share_of
+from focgen.diagnosis.hypotheses.converter import Converter, rms
+from focgen.diagnosis.hypotheses.rivals import Beside, Cause, Rival, alike, change_of, share_of, without
 from focgen.diagnosis.hypotheses.search import Ranking, evidence, family, is_itself, on_all, rank
 from focgen.diagnosis.numbers import NUMBERS
+from focgen.rig.effects import library
 
 _STEPS = 6  # iterations
+_AS_WELL = 1.02  # times the error: a loop has more numbers
+_FINELY = {"xatol": 0.003, "maxiter": 20}  # of a step
 
 
 def with_steps(
@@ -28,6 +33,33 @@ def with_steps(
     """What was found, with what is there beside the steps of a ``converter``, and with the steps where they
     make more than noise. Steps that are noise hide an effect from the search all the same. ``beside``: what
     every effect is doubted with; ``asked``: what it has to show."""
+    return _its_own(converter, *_with_steps(converter, best, causes, beside, asked), beside)
+
+
+def _its_own(
+    converter: Converter, best: Fit, causes: tuple[Cause, ...], beside: Beside
+) -> tuple[Fit, tuple[Cause, ...]]:
+    """What was found, but for a loop of the reading that is the converter's own: where its levels go on late
+    either way, as those of encoders and comparators do, the loop is no wider than a step."""
+    loops = [c.rivals[0].effect for c in causes if library()[c.rivals[0].effect].remembers]
+    if not loops:
+        return best, causes
+    own = (*loops, converter.candidate.effect)
+    found, weighing = [c for c in best.problem.candidates if c.effect in own], beside.weighing
+    bare = without(best, found, weighing)
+    bare = fit(bare.problem, bare.vector, WHITE, _STEPS)
+    missed = lambda lag: rms(converter.sluggish(lag).stepped(bare).weighed)
+    late = converter.sluggish(minimize_scalar(missed, bounds=(0.0, 0.5), method="bounded", options=_FINELY).x)
+    there = best if converter.candidate in best.problem.candidates else converter.stepped(best)
+    if rms(late.stepped(bare).weighed) > _AS_WELL * rms(there.weighed):
+        return best, causes
+    kept = tuple(c for c in causes if c.rivals[0].effect not in own)
+    return late.beside(bare, beside.nominal, kept, weighing)
+
+
+def _with_steps(
+    converter: Converter, best: Fit, causes: tuple[Cause, ...], beside: Beside, asked: AcceptanceCriteria
+) -> tuple[Fit, tuple[Cause, ...]]:
     nominal, weighing = beside.nominal, beside.weighing
     noise = converter.is_noise(nominal, alone=not best.problem.candidates)
     nothing = asked.granted or (noise and best.predictable_share < NUMBERS.left)

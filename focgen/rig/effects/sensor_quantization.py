@@ -3,6 +3,7 @@
 import numpy as np
 
 from focgen.arrays import Array
+from focgen.rig import kernels
 from focgen.rig.effects._effect import STEP, Effect, Form, Parameter, Run, Values
 from focgen.rig.effects._levels import seen
 
@@ -12,6 +13,22 @@ def _round(x: Array, values: Values, run: Run) -> Array:
     return step * np.round((x - phase) / step) + phase if step > 0 else x
 
 
+def _sluggish(x: Array, values: Values, run: Run) -> Array:
+    """A level goes on only once it is passed by ``lag`` of a step more than half a one, as with encoders and
+    comparators that are not to chatter: a play ahead of the rounding."""
+    step, phase, lag = values
+    return _round(kernels.play(x, run.rest, lag * step), (step, phase), run)
+
+
+def _never(y: Array) -> None:
+    """It cannot be read off the levels: with them, a rounding is."""
+
+
+_STEPS = (
+    Parameter(STEP, level=1, lower=0.0, upper=2.0, starts=tuple(np.geomspace(0.008, 0.3, 6)), zero=0.0),
+    Parameter("phase", level=1, lower=-0.5, upper=0.5, starts=(0.0,)),
+)
+
 EFFECT = Effect(
     name="sensor_quantization",
     stage="sensor",
@@ -20,17 +37,13 @@ EFFECT = Effect(
     confused_with=("valve_stiction",),
     needs=lambda e: None,
     forms=[
+        Form("rounding", "reading", _STEPS, _round, seen=seen),
         Form(
-            "rounding",
+            "sluggish",
             "reading",
-            (
-                Parameter(
-                    STEP, level=1, lower=0.0, upper=2.0, starts=tuple(np.geomspace(0.008, 0.3, 6)), zero=0.0
-                ),
-                Parameter("phase", level=1, lower=-0.5, upper=0.5, starts=(0.0,)),
-            ),
-            _round,
-            seen=seen,
-        )
+            (*_STEPS, Parameter("lag", lower=0.0, upper=0.5, starts=(0.2,))),
+            _sluggish,
+            seen=_never,
+        ),
     ],
 )
