@@ -41,7 +41,7 @@ def _its_own(
 ) -> tuple[Fit, tuple[Cause, ...]]:
     """What was found, but for a loop of the reading that is the converter's own: where its levels go on late
     either way, as those of encoders and comparators do, the loop is no wider than a step."""
-    loops = [c.rivals[0].effect for c in causes if library()[c.rivals[0].effect].remembers]
+    loops = [c.rivals[0].effect for c in causes if _is_loop_behind(c.rivals[0])]
     if not loops:
         return best, causes
     own = (*loops, converter.candidate.effect)
@@ -55,6 +55,12 @@ def _its_own(
         return best, causes
     kept = tuple(c for c in causes if c.rivals[0].effect not in own)
     return late.beside(bare, beside.nominal, kept, weighing)
+
+
+def _is_loop_behind(rival: Rival) -> bool:
+    """Whether it is a loop behind all that moves."""
+    effect, form = library()[rival.effect], rival.fit.problem.candidates[-1].form
+    return effect.remembers and (effect.stage == "sensor" or form.slot in ("place", "response"))
 
 
 def _with_steps(
