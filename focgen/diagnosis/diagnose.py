@@ -138,9 +138,9 @@ class _Search:
 def _told_by_another(
     search: _Search, explanations: tuple[Explanation, ...], session: tuple[Experiment, ...]
 ) -> tuple[tuple[Explanation, ...], tuple[Experiment, ...]]:
-    """The findings and the session, made anew with the begins that a rival tells where it leaves less by
+    """The findings and the session, made anew with the begins that a rival tells where it leaves far less by
     these than what was found does by its own. The pasts were told without any effect, and such a past
-    misleads one that remembers."""
+    misleads one that remembers. Where it leaves but a little less, its begins are those that suit it."""
     estimated = any(not b.known for log in session for b in log.begins.values())
     if search.only is not None or not estimated:
         return explanations, session
@@ -150,7 +150,7 @@ def _told_by_another(
         tried = [e.best, *others] if others else []
         told = [_begun_by(search.nominal, explanations, number, fit, session) for fit in tried]
         left = [np.mean(begun_as(e, fit, logs).weighed ** 2) for fit, logs in zip(tried, told)]
-        if left and min(left) < left[0]:
+        if left and min(left) < NUMBERS.unlikely * left[0]:
             step("how the logs begin")
             logs = told[int(np.argmin(left))]
             again = search.better(explanations, logs)
