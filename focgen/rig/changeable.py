@@ -85,7 +85,7 @@ def _changeable(actuator: Actuator | LinearActuator) -> frozenset[str]:
         return _OF_LAGS | ({"flow"} if lag and lag[2] == 1.0 else set())
     plant = plants.plant_of(actuator.dynamics)
     found = {"bend"} if linear.is_spring(actuator.dynamics) else set()
-    if plant is None and linear.is_damped(actuator.dynamics):
+    if plant is None and is_damped(actuator.dynamics):
         found |= {"drag"}
     if plant is None and lags.is_sum_of_lags(actuator.dynamics):
         found |= {"loading", "unloading"}
@@ -93,3 +93,18 @@ def _changeable(actuator: Actuator | LinearActuator) -> frozenset[str]:
         found |= {"drag"} | ({"rise"} if plant.order == 2 else set())
         found |= IN_STEPS if plant.order == 2 and not plant.integrates else set()
     return frozenset(found)
+
+
+def is_damped(transfer: TransferFunction) -> bool:
+    """Whether it is of springs and dampers without a mass: a force moves it at once, it comes to rest at a
+    level, and its poles are real, with a zero between each and the next."""
+    num, den = transfer.num, transfer.den
+    at_once, at_rest = den[0].order - num[0].order == 1.0, num[-1].order == den[-1].order == 0.0
+    if not (transfer.is_integer and at_once and at_rest):
+        return False
+    poles, zeros = (np.roots(linear.coefficients(side)) for side in (den, num))
+    turns = np.concatenate([poles, zeros])
+    if np.any(turns.real >= 0.0) or np.any(np.abs(turns.imag) > 1e-9 * np.abs(turns)):
+        return False
+    slowest, between = np.sort(-poles.real), np.sort(-zeros.real)
+    return bool(np.all(slowest[:-1] < between) and np.all(between < slowest[1:]))

@@ -158,14 +158,6 @@ def is_spring(transfer: TransferFunction) -> bool:
     return holds_level(transfer) and transfer.is_integer
 
 
-def is_damped(transfer: TransferFunction) -> bool:
-    """Whether it is of springs and dampers without a mass: its orders are whole, it comes to rest at a level,
-    and a force moves it at once."""
-    num, den = transfer.num, transfer.den
-    at_rest = num[-1].order == 0.0 == den[-1].order
-    return transfer.is_integer and at_rest and den[0].order == num[0].order + 1.0
-
-
 def _in_lines(x: Array, rest: Bytes, between: Between | bool) -> Array:
     """The input (n,) for loops that take it in straight lines: a smooth one with its bends sharpened."""
     return sharpened(np.ascontiguousarray(x, float), rest) if between == Between.SMOOTH else x

@@ -67,3 +67,12 @@ def test_an_effect_is_found_by_the_readings(fill, effect, named):
     found = diagnose(RIG, logged(session(4, **effect), fill), pictures=False)
     (cause,) = found.causes
     assert cause.candidates[0].effect == named
+
+
+def test_a_log_at_rest_beside_slow_ones_is_read(tmp_path):
+    """It has next to no readings. The proposal and the pictures are made all the same."""
+    logs = logged(session(4, slip=0.6), every(8, held))
+    still = {role: np.zeros(60) for role in logs[0].signals}
+    rest = replace(logs[-1], name="rest", signals=still, start=logs[-1].start + 60.0)
+    found = diagnose(RIG, [*logs, rest], out=tmp_path / "gap")
+    assert [c.candidates[0].effect for c in found.causes] == ["hysteresis"]

@@ -150,7 +150,7 @@ def test_only_experiments_that_show_the_rivals_are_proposed(rivals, left_out):
     asked = [SimpleNamespace(effect=name) for name in rivals]
     problem = SimpleNamespace(references=SimpleNamespace(clocks={"response": 2.0}))
     nothing = SimpleNamespace(
-        segment=SimpleNamespace(parts=lambda x: [], x=None, run=SimpleNamespace(h=0.02)),
+        segment=SimpleNamespace(fed=SimpleNamespace(parts=lambda x: [], x=None, run=SimpleNamespace(h=0.02))),
         nominal=SimpleNamespace(problem=problem),
     )
     choices = menu(InputLimits(0.0, 1.0, 0.0, np.inf, 1200.0, 2.0, 0.02))

@@ -109,3 +109,44 @@ def test_straight_lines_take_the_place_of_what_was_held():
     assert np.allclose(found["output"], drawn(log["output"], rows))
     assert found["command"] is log["command"]
     assert not found.between(1.0, 5.0).readings
+
+
+def lagged(drive, kept):
+    made, now = np.empty(len(drive)), 0.0
+    for i, value in enumerate(drive):
+        now = kept * now + (1 - kept) * value
+        made[i] = now
+    return made
+
+
+@pytest.mark.parametrize("kept", [0.0, 0.5, 0.9, 0.98])
+@pytest.mark.parametrize("digits", [2, 3, 5, 15])
+def test_a_cycle_of_the_experiment_is_no_logger(kept, digits):
+    """Squares, triangles and stairs of one length, with little noise or none."""
+    t = np.arange(1800)
+    cycles = [np.where(t // 40 % 2, 1.0, 0.0), np.abs((t % 60) - 30) / 30.0]
+    cycles += [np.random.default_rng(3).uniform(size=90)[t // 20], np.minimum(t % 50, 20) / 20.0]
+    for drive in cycles:
+        for noise in (0.0, 0.05, 0.1, 0.2, 0.3):
+            rng = np.random.default_rng(4)
+            y = np.round(lagged(drive, kept) + noise * 10.0**-digits * rng.normal(size=len(t)), digits)
+            logs = [Experiment(str(i), STEP, {"command": drive, "output": y}) for i in range(2)]
+            assert not any(log.readings for log in with_readings(logs))
+
+
+@pytest.mark.parametrize("fill", [held, drawn])
+def test_a_part_too_short_to_tell_has_the_pace_of_the_others(fill):
+    rng = np.random.default_rng(5)
+    rows = np.arange(0, COUNT, 8)
+    filled = fill(signal(rng), rows)
+    parts = [filled, filled[::-1], filled[800:861], np.zeros(60), filled[:3], filled[:1]]
+    found = readings(parts)
+    assert [kept[0] for kept in found] == [0] * 6
+    assert all(kept[-1] < len(part) for kept, part in zip(found, parts, strict=True))
+    assert [len(kept) for kept in found[2:]] == [8, 8, 2, 1]
+
+
+def test_numbers_next_to_nothing_are_no_fault():
+    rng = np.random.default_rng(6)
+    assert readings([1e-298 * rng.normal(size=COUNT)]) is None
+    assert readings([np.zeros(COUNT)]) is None and readings([np.full(7, 1e300)]) is None

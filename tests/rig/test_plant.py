@@ -12,7 +12,7 @@ from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
 from focgen.rig import linear
-from focgen.rig.changeable import fits_in
+from focgen.rig.changeable import fits_in, is_damped
 from focgen.rig.dynamics import Bend, Dynamics, Friction, Rise, Spring
 from focgen.rig.effects import Run, form_of
 from focgen.rig.engine import Chain, Placed
@@ -230,6 +230,22 @@ def test_friction_of_a_spring_beside_dampers_holds_it_while_they_relax(form, val
     found = Chain(rig, placed).run(u, "regulator", "sensor", Run.of([len(u)], [0.0], h))
     np.testing.assert_allclose(found, made, atol=1e-3 * np.ptp(made))
     assert np.max(np.abs(Chain(rig).run(u, "regulator", "sensor", Run.of([len(u)], [0.0], h)) - made)) > 0.05
+
+
+@pytest.mark.parametrize(
+    "num, den, damped",
+    [
+        ((1.0, 0.5), (1.0, 3.2, 2.0), False),  # a zero slower than both poles
+        ((1.0, 1.5), (1.0, 3.2, 2.0), True),
+        ((1.0, 1.0), (1.0, 0.2, 1.0), False),
+        ((-1.0, 1.5), (1.0, 3.2, 2.0), False),
+        ((1.0, 1.5), (1.0, -3.2, 2.0), False),
+        ((1.5,), (1.0, 3.2, 2.0), False),
+    ],
+)
+def test_springs_and_dampers_have_a_zero_between_their_poles(num, den, damped):
+    terms = [[(c, float(len(side) - 1 - i)) for i, c in enumerate(side)] for side in (num, den)]
+    assert is_damped(TransferFunction(*terms)) == damped
 
 
 def test_a_smooth_input_is_taken_as_smooth():

@@ -47,19 +47,21 @@ def _its_own(
     own = (*loops, converter.candidate.effect)
     found, weighing = [c for c in best.problem.candidates if c.effect in own], beside.weighing
     bare = without(best, found, weighing)
-    bare = fit(bare.problem, bare.vector, WHITE, _STEPS)
+    bare = fit(bare.problem, fit(bare.problem, bare.vector, WHITE, _STEPS).vector, weighing, 0)
     missed = lambda lag: rms(converter.sluggish(lag).stepped(bare).weighed)
     late = converter.sluggish(minimize_scalar(missed, bounds=(0.0, 0.5), method="bounded", options=_FINELY).x)
     there = best if converter.candidate in best.problem.candidates else converter.stepped(best)
     if rms(late.stepped(bare).weighed) > _AS_WELL * rms(there.weighed):
         return best, causes
     kept = tuple(c for c in causes if c.rivals[0].effect not in own)
-    return late.beside(bare, beside.nominal, kept, weighing)
+    stands, every = late.beside(bare, beside.nominal, kept, weighing)
+    return (stands, every) if stands is not bare else (best, causes)
 
 
 def _is_loop_behind(rival: Rival) -> bool:
     """Whether it is a loop behind all that moves."""
-    effect, form = library()[rival.effect], rival.fit.problem.candidates[-1].form
+    effect = library()[rival.effect]
+    form = next(c.form for c in reversed(rival.fit.problem.candidates) if c.effect == rival.effect)
     return effect.remembers and (effect.stage == "sensor" or form.slot in ("place", "response"))
 
 

@@ -85,7 +85,7 @@ class CandidateRig:
 
     @property
     def coarse(self) -> int:
-        """Samples of the session that one of its own stands for."""
+        """Readings of the session that one sample of its own stands for."""
         return max(1, round(present(self.run).h / self.part.problem.segment.run.h))
 
     def left_by(self, stage: str | None) -> np.ndarray:

@@ -249,11 +249,11 @@ def _showing(
 ) -> list[tuple[Choice, list[CandidateRig]]]:
     """The experiments that together with those at hand are made to show most of the rivals."""
     needs = [library()[r.effect].needs for r in rivals]
-    before, response = e.segment.parts(e.segment.x), e.nominal.problem.references.clocks["response"]
+    fed, response = e.segment.fed, e.nominal.problem.references.clocks["response"]
     hidden = []
     for choice, made in choices:
         entering = np.repeat(made[0].entering, choice.limits.coarse)
-        done = excitation([*before, entering], e.segment.run.h, response)
+        done = excitation([*fed.parts(fed.x), entering], fed.run.h, response)
         hidden.append(sum(need(done) is not None for need in needs))
     return [c for c, count in zip(choices, hidden, strict=True) if count == min(hidden)]
 

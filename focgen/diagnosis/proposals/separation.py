@@ -18,6 +18,7 @@ import numpy as np
 from focgen.diagnosis.fitting.fit import Fit
 from focgen.diagnosis.fitting.noise import whiten
 from focgen.diagnosis.hypotheses.rivals import Rival
+from focgen.present import present
 
 if TYPE_CHECKING:
     from focgen.diagnosis.hypotheses.explain import Explanation
@@ -72,11 +73,13 @@ def _columns(
 
 
 def _innovations(e: Explanation, rig: CandidateRig, stage: str | None, made: np.ndarray) -> np.ndarray:
-    """A signal (n,) as innovations at the session's rate, in shares of the level by which noise is."""
+    """A signal (n,) as innovations at the rate of the session's readings, in shares of the level by which
+    noise is."""
     level = e.segment.level_out
     if stage is not None:
         level = _NOISIER * max(float(np.max(np.abs(rig.left_by(stage)))), 1e-300)
-    return whiten(np.repeat(made, rig.coarse) / level, e.ar)
+    every = max(1, round(e.segment.run.h / present(rig.run).h))  # of a slow gauge: as seldom as it is read
+    return whiten(np.repeat(made[::every], rig.coarse) / level, e.ar)
 
 
 def _beforehand(fit: Fit) -> np.ndarray:

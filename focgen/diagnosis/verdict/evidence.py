@@ -106,7 +106,8 @@ def _steady(x: Array, run: Run) -> Array:
 
 def _rate_of(level: Array, run: Run) -> Array:
     """Its rate of change, 1/s."""
-    return np.concatenate([np.gradient(level[a:b], run.h) for a, b in run.spans])
+    rates = [np.gradient(level[a:b], run.h) if b - a > 1 else np.zeros(b - a) for a, b in run.spans]
+    return np.concatenate(rates)
 
 
 def _way_of(rate: Array) -> Array:
