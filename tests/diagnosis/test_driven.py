@@ -42,7 +42,7 @@ def session(seed, **what):
     stairs = np.repeat([2.0, 6.0, 10.0, 4.0, 9.0, 0.0, 7.0, 10.0, 3.0, 5.0], 300)
     sines = 5.0 - 5.0 * np.cos(2 * np.pi * t / 90.0)
     logs, start = [], 0.0
-    for name, power in (("stairs", stairs), ("sines", sines), ("back", stairs[::-1])):
+    for name, power in (("stairs", stairs), ("sines", sines)):
         y = heated(power, **what) + 0.25 * rng.normal(size=len(power))
         logs.append(Experiment(name, H, {"command": power, "output": y}, start=start))
         start += len(power) * H + 200.0

@@ -124,7 +124,9 @@ def relaxing(logs, share, time, seed):
         yield replace(log, signals=signals)
 
 
-@pytest.mark.parametrize("kept", [("steps", "hold"), ("steps", "stairs", "sines")])
+@pytest.mark.parametrize(
+    "kept", [pytest.param(("steps", "hold"), marks=pytest.mark.long), ("steps", "stairs", "sines")]
+)
 def test_a_past_is_told_by_what_remembers_it(kept):
     """Told without the effect it suited a bent reading, or a loop, at 0.95, which left two to three times the
     noise."""
