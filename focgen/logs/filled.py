@@ -3,7 +3,7 @@ line to it. Such rows are no readings: what they are off by is the logger's doin
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,10 +23,7 @@ _SLOWEST = 50  # rows a reading
 _JUMP = 0.02  # of the span: a drive that is on or off is written in a digit as large as it is
 _DRIVEN, _SELDOM, _SOON = 0.7, 0.35, 4  # of the readings, of all rows, and rows: where a drive has just bent
 _DIGITS, _EXACT = 15, 1e-12  # of a number in a computer, and what is lost of its span in a sum
-
 _LEAST = 1e-280  # of a number that is none
-
-_Rows = Callable[[Array], "Ints | None"]
 
 
 def with_readings(logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
@@ -60,9 +57,9 @@ def _is_driven(logs: Sequence[Experiment], role: str, rows: Sequence[Ints]) -> b
 
 def _soon_after(drive: Array) -> Array:
     """Which rows (n,) are at a bend of ``drive`` (n,) or soon after it; the first one is."""
-    near = np.zeros(len(drive) + _SOON, bool)
+    near, bends = np.zeros(len(drive) + _SOON, bool), _off_line(drive, _JUMP)
     for later in range(-1, _SOON):
-        near[_off_line(drive, _JUMP) + later] = True
+        near[bends + later] = True
     near[0] = True
     return near[: len(drive)]
 

@@ -6,6 +6,7 @@ taken for a logger's doing, or when a dead band is not told.
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from focgen.logs.experiment import Experiment
 from focgen.logs.filled import readings, with_readings
@@ -112,11 +113,8 @@ def test_straight_lines_take_the_place_of_what_was_held():
 
 
 def lagged(drive, kept):
-    made, now = np.empty(len(drive)), 0.0
-    for i, value in enumerate(drive):
-        now = kept * now + (1 - kept) * value
-        made[i] = now
-    return made
+    """``drive`` (n,) behind a lag that keeps this much from sample to sample."""
+    return lfilter([1.0 - kept], [1.0, -kept], drive)
 
 
 @pytest.mark.parametrize("kept", [0.0, 0.5, 0.9, 0.98])
@@ -127,7 +125,7 @@ def test_a_cycle_of_the_experiment_is_no_logger(kept, digits):
     cycles = [np.where(t // 40 % 2, 1.0, 0.0), np.abs((t % 60) - 30) / 30.0]
     cycles += [np.random.default_rng(3).uniform(size=90)[t // 20], np.minimum(t % 50, 20) / 20.0]
     for drive in cycles:
-        for noise in (0.0, 0.05, 0.1, 0.2, 0.3):
+        for noise in (0.0, 0.1, 0.2):
             rng = np.random.default_rng(4)
             y = np.round(lagged(drive, kept) + noise * 10.0**-digits * rng.normal(size=len(t)), digits)
             logs = [Experiment(str(i), STEP, {"command": drive, "output": y}) for i in range(2)]
