@@ -30,7 +30,7 @@ def fresh_rows(y: Array) -> tuple[float, Ints] | None:
 
     A coarse converter repeats values as well: its changes come at any row, or nearly all are by one count.
     """
-    changes = changes_of(y)
+    changes = _changes(y)
     if len(changes) < _CHANGES:
         return None
     gaps = np.diff(changes)
@@ -46,8 +46,8 @@ def fresh_rows(y: Array) -> tuple[float, Ints] | None:
     return period, _slots(changes, periods.astype(int), gaps)
 
 
-def changes_of(y: Array) -> Ints:
-    """The rows of ``y`` (n,) that differ from the one before."""
+def _changes(y: Array) -> Ints:
+    """The rows that differ from the one before."""
     rows = np.flatnonzero(y[1:] != y[:-1])
     rows += 1
     return rows
@@ -68,7 +68,7 @@ def _slots(changes: Ints, periods: Ints, gaps: Ints) -> Ints:
 def dead_band(y: Array) -> float:
     """By how much ``y`` (n,) changes at least where a logger reports it on change, in its unit: it repeats a
     reading until one differs by so much. 0 where it does not. A converter's levels come again and again."""
-    rows = changes_of(y)
+    rows = _changes(y)
     if not _CHANGES <= len(rows) <= _SELDOM * len(y):
         return 0.0
     sizes, levels = np.abs(y[rows] - y[rows - 1]), np.unique(y[rows])
@@ -85,7 +85,7 @@ def frozen(y: Array, others: list[Array]) -> tuple[int, int] | None:
     A value at either end of the signal's span is rest or saturation; a converter so coarse that values
     repeat anyway proves nothing.
     """
-    ends = np.concatenate([[0], changes_of(y), [len(y)]])
+    ends = np.concatenate([[0], _changes(y), [len(y)]])
     lengths = np.diff(ends)
     if len(lengths) < _CHANGES:
         return None

@@ -77,9 +77,9 @@ def _levered(actuator: Actuator | LinearActuator) -> frozenset[str]:
 
 def _changeable(actuator: Actuator | LinearActuator) -> frozenset[str]:
     """What effects may change of an actuator's own equation: all of a single lag's but a hysteretic spring; a
-    spring that bends where there is one; dry friction on what moves, or yields as a spring beside dampers
-    does; of a mass on a spring also a hysteretic
-    one, an obstacle, a preload, its damper and its mass; of what else is a sum of lags, the pace each way."""
+    spring that bends where there is one; dry friction on what moves, or on springs beside dampers; of a mass
+    on a spring also a hysteretic one, an obstacle, a preload, its damper and its mass; of what else is a sum
+    of lags, the pace each way."""
     lag = None if isinstance(actuator, Actuator) else linear.single_lag(actuator.dynamics)
     if isinstance(actuator, Actuator) or lag:
         return _OF_LAGS | ({"flow"} if lag and lag[2] == 1.0 else set())

@@ -23,7 +23,10 @@ from focgen.diagnosis.verdict.instead import bases
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import form_of
+from focgen.rig.replay import replay
 from focgen.rig.rig import LinearActuator, Rig, Signals
+from tests.diagnosis_rig import RIG as FINGER
+from tests.diagnosis_rig import session as finger_session
 
 H = 0.05
 LAG = TransferFunction([(1.9, 0.0)], [(1.06 * 0.8, 1.0), (1.0, 0.0)])
@@ -263,15 +266,31 @@ def late(y, step, lag):
     return read
 
 
-@pytest.mark.parametrize("lag, seed", [(0.15, 1), pytest.param(0.3, 2, marks=pytest.mark.long)])
-def test_steps_that_go_on_late_are_no_loop_beside_them(lag, seed):
-    rng, logs = np.random.default_rng(seed), session(0.5, 0.0, seed)
-    for i, log in enumerate(logs):
-        read = late(answered(log["command"]) + 0.03 * rng.normal(size=len(log)), 1.2, lag)
-        logs[i] = replace(log, signals={**log.signals, "output": read})
-    found = diagnose(HEATER, logs, pictures=False)
+def read_late(part, lag, seed):
+    """A sound finger read in steps, ``part`` of the span each, that go on late."""
+    logs = finger_session(seed, noise=0.003)
+    step = part * np.ptp(np.concatenate([log["output"] for log in logs]))
+    return [replace(log, signals={**log.signals, "output": late(log["output"], step, lag)}) for log in logs]
+
+
+@pytest.mark.parametrize(
+    "part, lag, seed", [(0.05, 0.3, 1), pytest.param(0.08, 0.2, 2, marks=pytest.mark.long)]
+)
+def test_steps_that_go_on_late_are_no_loop_beside_them(part, lag, seed, tmp_path):
+    logs = read_late(part, lag, seed)
+    found = diagnose(FINGER, logs, out=tmp_path / "gap", pictures=False)
     (cause,) = found.causes
-    assert cause.candidates[0].effect == "sensor_quantization"
+    first = cause.candidates[0]
+    assert (first.effect, first.form) == ("sensor_quantization", "sluggish")
+    again = replay(tmp_path / "gap" / "augmented.toml", logs)
+    left = np.sqrt(np.mean([log.rmse**2 for log in again.logs.values()]))
+    assert left == pytest.approx(found.gap.explained, rel=0.02)
+
+
+def test_a_loop_that_is_taken_for_granted_stays():
+    told = ("sensor_hysteresis", "sensor_quantization")
+    found = diagnose(FINGER, read_late(0.05, 0.3, 1), only=told, pictures=False)
+    assert "sensor_hysteresis" in [cause.candidates[0].effect for cause in found.causes]
 
 
 @pytest.mark.parametrize("step", [1.2, pytest.param(0.8, marks=pytest.mark.long)])

@@ -33,7 +33,8 @@ def with_steps(
     """What was found, with what is there beside the steps of a ``converter``, and with the steps where they
     make more than noise. Steps that are noise hide an effect from the search all the same. ``beside``: what
     every effect is doubted with; ``asked``: what it has to show."""
-    return _its_own(converter, *_with_steps(converter, best, causes, beside, asked), beside)
+    best, causes = _with_steps(converter, best, causes, beside, asked)
+    return (best, causes) if asked.granted else _its_own(converter, best, causes, beside)
 
 
 def _its_own(
@@ -47,14 +48,13 @@ def _its_own(
     own = (*loops, converter.candidate.effect)
     found, weighing = [c for c in best.problem.candidates if c.effect in own], beside.weighing
     bare = without(best, found, weighing)
-    bare = fit(bare.problem, fit(bare.problem, bare.vector, WHITE, _STEPS).vector, weighing, 0)
     missed = lambda lag: rms(converter.sluggish(lag).stepped(bare).weighed)
-    late = converter.sluggish(minimize_scalar(missed, bounds=(0.0, 0.5), method="bounded", options=_FINELY).x)
+    closest = minimize_scalar(missed, bounds=(0.0, 0.5), method="bounded", options=_FINELY)
     there = best if converter.candidate in best.problem.candidates else converter.stepped(best)
-    if rms(late.stepped(bare).weighed) > _AS_WELL * rms(there.weighed):
+    if closest.fun > _AS_WELL * rms(there.weighed):
         return best, causes
     kept = tuple(c for c in causes if c.rivals[0].effect not in own)
-    stands, every = late.beside(bare, beside.nominal, kept, weighing)
+    stands, every = converter.sluggish(float(closest.x)).beside(bare, beside.nominal, kept, weighing)
     return (stands, every) if stands is not bare else (best, causes)
 
 
