@@ -289,7 +289,7 @@ def test_steps_that_go_on_late_are_no_loop_beside_them(part, lag, seed, tmp_path
 
 def test_a_loop_that_is_taken_for_granted_stays():
     told = ("sensor_hysteresis", "sensor_quantization")
-    found = diagnose(FINGER, read_late(0.05, 0.3, 1), only=told, pictures=False)
+    found = diagnose(FINGER, read_late(0.05, 0.3, 2), only=told, pictures=False)
     assert "sensor_hysteresis" in [cause.candidates[0].effect for cause in found.causes]
 
 

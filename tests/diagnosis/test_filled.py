@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from focgen.diagnosis.diagnose import diagnose
+from focgen.diagnosis.verdict import evidence
+from focgen.rig.effects import Run
 from tests.diagnosis_rig import RIG, session
 from tests.logs.test_filled import drawn, held, reported
 
@@ -76,3 +78,9 @@ def test_a_log_at_rest_beside_slow_ones_is_read(tmp_path):
     rest = replace(logs[-1], name="rest", signals=still, start=logs[-1].start + 60.0)
     found = diagnose(RIG, [*logs, rest], out=tmp_path / "gap")
     assert [c.candidates[0].effect for c in found.causes] == ["hysteresis"]
+
+
+def test_an_experiment_of_one_reading_has_no_rate():
+    run = Run.of([3, 1, 2], [0.0, 10.0, 20.0], 0.5)
+    rates = evidence._rate_of(np.array([0.0, 1.0, 2.0, 7.0, 4.0, 5.0]), run)
+    np.testing.assert_allclose(rates, [2.0, 2.0, 2.0, 0.0, 2.0, 2.0])
