@@ -9,6 +9,7 @@
  */
 #include <math.h>
 #include "bent.h"
+#include "kernels.h"
 #include "modes.h"
 
 enum { BALANCED = 2, TURNS = 40 };

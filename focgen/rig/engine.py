@@ -11,7 +11,7 @@ from focgen.arrays import Array
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
 from focgen.present import present
-from focgen.rig import chamber, lags, linear, uneven
+from focgen.rig import chamber, lags, linear, solved, uneven
 from focgen.rig import plant as plants
 from focgen.rig.begun import past_of, with_past
 from focgen.rig.changeable import IN_STEPS
@@ -22,7 +22,7 @@ from focgen.rig.lever import levered
 from focgen.rig.modes import respond
 from focgen.rig.rig import UNITY, Actuator, LinearActuator, Rig
 from focgen.rig.stages import STAGES
-from focgen.rig.weak import weakened
+from focgen.rig.weak import can_be_solved, solved_weak, weakened
 
 
 @dataclass(frozen=True)
@@ -261,34 +261,42 @@ def _actuator(
     if dynamics.pace != STEADY:
         ahead = (("zero", actuator), lambda x, run: actuator.drive(x), None)
         return [ahead, *drive, _uneven(actuator.dynamics, dynamics.pace, between, delay)]
-    if dynamics.lever != SAME and delay:
+    if (weak or dynamics.lever != SAME) and delay:  # what is late is what drives it
         return [*_actuator(actuator, here, between, 0.0), _transfer(UNITY, Between.STRAIGHT, delay)]
     lever, dynamics = dynamics.lever, dynamics.without("lever")
     if isinstance(actuator, LinearActuator):
         zero = [(("bias", actuator.bias), lambda x, run: actuator.drive(x), None)] if actuator.bias else []
-        steps = _levered(_linear(actuator, dynamics, between, delay), actuator, dynamics, lever, between)
-        return [*zero, *drive, *weakened(steps, weak, actuator.dynamics.dc_gain)]
+        steps = _linear(actuator, dynamics, between, delay)
+        steps = _yielding(steps, actuator, weak, dynamics, lever, between)
+        return [*zero, *drive, *steps]
     line = (actuator.gain, lambda x, run: actuator.drive(x), None)
     lag = _lag(1.0, actuator.T, actuator.alpha, dynamics.without("mass"), delay)
-    steps = _levered([lag, *_swung(actuator.T, dynamics.mass)], actuator, dynamics, lever, between)
-    return [line, *drive, *weakened(steps, weak, 1.0)]
+    steps = [lag, *_swung(actuator.T, dynamics.mass)]
+    return [line, *drive, *_yielding(steps, actuator, weak, dynamics, lever, Between.STRAIGHT)]
 
 
-def _levered(
+def _yielding(
     steps: list[Step],
     actuator: Actuator | LinearActuator,
+    weak: list[Placed],
     dynamics: Dynamics,
     lever: Lever,
     between: Between | bool,
 ) -> list[Step]:
-    if lever == SAME or dynamics != UNCHANGED:
-        return levered(steps, lever)
-    of = actuator.dynamics
-    between = between if isinstance(actuator, LinearActuator) else Between.STRAIGHT
+    """The steps of an actuator with what drives it changed where it is, and with what is weak in it: solved
+    for where nothing else of its equation changes, and else by turns."""
+    of, alone = actuator.dynamics, dynamics == UNCHANGED
+    if weak and alone and lever == SAME and can_be_solved(weak):
+        return solved_weak(of, weak, between)
+    steps = _levered(of, lever, between) if alone and lever != SAME else levered(steps, lever)
+    return weakened(steps, weak, of.dc_gain)
+
+
+def _levered(of: TransferFunction, lever: Lever, between: Between | bool) -> list[Step]:
     return [
         (
             (of, lever, between),
-            lambda x, run: linear.run_levered(of, x, run.rest, run.h, run.duration, between, lever),
+            lambda x, run: solved.run_levered(of, x, run.rest, run.h, run.duration, between, lever),
             None,
         )
     ]
@@ -372,7 +380,7 @@ def _lag(gain: float, T: float, alpha: float, dynamics: Dynamics, delay: float) 
 def _bent(transfer: TransferFunction, dynamics: Dynamics, between: Between | bool, delay: float) -> Step:
     return (
         (transfer, dynamics, between, delay),
-        lambda x, run: linear.run_bent(transfer, x, run.rest, run.h, between, dynamics, delay),
+        lambda x, run: solved.run_bent(transfer, x, run.rest, run.h, between, dynamics, delay),
         None,
     )
 

@@ -7,6 +7,7 @@
 #ifdef __GLIBC__
 #include <malloc.h>
 #endif
+#include "kernels.h"
 #include "modes.h"
 
 enum { BALANCED = 2 };

@@ -1,5 +1,5 @@
 """The compiled loops of the chain simulator (``kernels.c``, ``bending.c``, ``plant.c``,
-``pace.c``, ``lever.c``) as functions.
+``pace.c``, ``lever.c``, ``weak.c``) as functions.
 
 The C is compiled on first use (half a second) into a temporary folder and loaded with cffi; nothing is left
 behind. Every function takes a session's signal, shape (n,), and ``rest`` (n,), 1 where an experiment begins
@@ -25,57 +25,8 @@ BALANCED = 2
 _AT_ONCE = 1024  # samples that a compiled loop looks at many times: AT_ONCE in ``kernels.c``
 _REGISTERS = 3  # a filter of order 2 is the quickest: one of order 1 is run as such
 _SOURCES = [
-    Path(__file__).with_name(name) for name in ("kernels.c", "bending.c", "plant.c", "pace.c", "lever.c")
+    Path(__file__).with_name(f"{name}.c") for name in ("kernels", "bending", "plant", "pace", "lever", "weak")
 ]
-_DECLARATIONS = """
-void focgen_keep_memory(void);
-void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a,
-    const double *b0, const double *b1, const double *pair, double through, int switching, double place,
-    double stiffness, double slide, double stick, double *z);
-void focgen_lag(int n, const double *x, double *y, const unsigned char *rest, const double *up, const
-    double *down);
-void focgen_chamber(int n, const double *x, double *y, const unsigned char *rest, double h, const double
-    *fill, const double *vent, double present, double most);
-void focgen_orifice(int n, const double *x, double *y, const unsigned char *rest, double h, double tau,
-    double vent, double scale, int sub);
-void focgen_rate(int n, const double *x, double *y, const unsigned char *rest, double h, double rate,
-    double tau, int soft, int sub);
-void focgen_drawn(int n, const double *x, double *y, const unsigned char *rest, double h, double full,
-    double draw, double refill);
-void focgen_play(int n, const double *x, double *y, const unsigned char *rest, double width, double
-    start);
-void focgen_pressed(int n, const double *x, double *y, const unsigned char *rest, double even, double
-    growing);
-void focgen_stick(int n, const double *x, double *y, const unsigned char *rest, double band, double
-    left, int anew, double place);
-void focgen_bouc_wen(int n, const double *x, double *y, const unsigned char *rest, double width);
-void focgen_power_creep(int n, const double *x, double *y, const unsigned char *rest, double h, double tau,
-    double scale, double power);
-void focgen_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double *b,
-    const double *a, double *w);
-int focgen_innovations(int n, const double *y, double *out, const unsigned char *rest, const double
-    *made, const double *weight, int coarse, int order, const double *ar, const double *less, double per,
-    double *room);
-void focgen_products(int n, int k, int known, const double *r, double *m);
-void focgen_plant(int n, const double *x, double *y, const unsigned char *rest, const double *line, const
-    double *bend, const double *twist, int order, int base, int last, const double *numbers, const double
-    *tables);
-void focgen_bent_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a,
-    const double *b0, const double *b1, const double *pair, double through, int switching, const double
-    *spring, double *z);
-void focgen_bent_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double *b,
-    const double *c, const double *a, const double *spring, double *w);
-void focgen_paced_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a,
-    const double *b0, const double *b1, const double *pair, double through, int by, const double *pace, const
-    double *share, double *z);
-void focgen_paced_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double *b,
-    const double *c, const double *a, int by, const double *pace, const double *share, double *w);
-void focgen_levered_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double
-    *a, const double *b0, const double *b1, const double *pair, double through, const double *lever, double
-    *z);
-void focgen_levered_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double
-    *b, const double *a, const double *lever, double *w);
-"""
 _FLAGS = ["-O3", "-fno-math-errno", "-fassociative-math", "-fno-signed-zeros", "-fno-trapping-math"]
 
 
@@ -84,7 +35,7 @@ def _library() -> tuple[Any, Any]:
     from cffi import FFI
 
     ffi = FFI()
-    ffi.cdef(_DECLARATIONS)
+    ffi.cdef(Path(__file__).with_name("kernels.h").read_text())
     with temporary_folder() as folder:
         target = str(folder / "kernels.so")
         try:
@@ -299,21 +250,32 @@ def paced_modes(
     x: Array, rest: Bytes, a: Array, b0: Array, b1: Array, pair: Array, through: float, slowness: Slowness
 ) -> Array:
     """As :func:`modes` of a row (m,) or (6,) each, of a stage whose pace is not even."""
-    by, pace, share = slowness
-    *pointers, own, shares, room = _doubles(a, b0, b1, pair, np.array(pace, float), share, np.empty(len(a)))
-    return _call("focgen_paced_modes", x, rest, len(a), *pointers, float(through), by, own, shares, room)
+    return _row_with("focgen_paced_modes", x, rest, (a, b0, b1, pair, through), slowness)
 
 
 def paced_rational(x: Array, rest: Bytes, b: Array, c: Array, a: Array, slowness: Slowness) -> Array:
     """As :func:`rational`, of a stage whose pace is not even, with ``c`` the numerator for what of the
     response enters."""
-    by, pace, share = slowness
-    order = max(len(a), len(b), len(c)) - 1
+    return _filter_with("focgen_paced_filter", x, rest, (b, c, a), slowness)
+
+
+def _row_with(name: str, x: Array, rest: Bytes, row: tuple[Any, ...], law: tuple[Any, ...]) -> Array:
+    """A loop over modes that take what enters as a ``law`` says: by what, its numbers, and one a sample."""
+    *modes, through = row
+    by, numbers, course = law
+    *pointers, own, each, room = _doubles(*modes, np.array(numbers, float), course, np.empty(len(modes[0])))
+    return _call(name, x, rest, len(modes[0]), *pointers, float(through), by, own, each, room)
+
+
+def _filter_with(name: str, x: Array, rest: Bytes, sides: tuple[Array, ...], law: tuple[Any, ...]) -> Array:
+    """The same over a discrete filter."""
+    by, numbers, course = law
+    order = max(map(len, sides)) - 1
     scratch, *tables = np.zeros((4, order + 1))
-    for table, values in zip(tables, (b, c, a)):
+    for table, values in zip(tables, sides):
         table[: len(values)] = values
-    *pointers, own, shares, room = _doubles(*tables, np.array(pace, float), share, scratch)
-    return _call("focgen_paced_filter", x, rest, order, *pointers, by, own, shares, room)
+    *pointers, own, each, room = _doubles(*tables, np.array(numbers, float), course, scratch)
+    return _call(name, x, rest, order, *pointers, by, own, each, room)
 
 
 def levered_modes(
@@ -333,6 +295,23 @@ def levered_rational(x: Array, rest: Bytes, b: Array, a: Array, lever: Sequence[
         table[: len(values)] = values
     pointers = _doubles(*tables, np.array(lever, float), scratch)
     return _call("focgen_levered_filter", x, rest, order, *pointers)
+
+
+Wear = tuple[int, Sequence[float], Array]
+"""What a spring gives way with, {growth, scale, before, gain}, and what else (n,) it is: see ``weak.c``."""
+
+
+def weak_modes(
+    x: Array, rest: Bytes, a: Array, b0: Array, b1: Array, pair: Array, through: float, wear: Wear
+) -> Array:
+    """As :func:`modes` of a row (m,) or (6,) each, of an actuator whose spring gives way."""
+    return _row_with("focgen_weak_modes", x, rest, (a, b0, b1, pair, through), wear)
+
+
+def weak_rational(x: Array, rest: Bytes, b: Array, c: Array, a: Array, wear: Wear) -> Array:
+    """As :func:`rational`, of an actuator whose spring gives way, with ``c`` the numerator for what of the
+    response comes back."""
+    return _filter_with("focgen_weak_filter", x, rest, (b, c, a), wear)
 
 
 def products(rows: Array, known: Array | None = None) -> Array:

@@ -3,6 +3,7 @@
  * `lever` = {first, second, scale}; `rest` is as in kernels.c.
  */
 #include <math.h>
+#include "kernels.h"
 #include "modes.h"
 
 enum { BALANCED = 2, TURNS = 40 };

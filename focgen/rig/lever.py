@@ -1,7 +1,7 @@
 """An actuator that is driven the more strongly, or the less, the further it has gone.
 
 T D^α y + y = x g(y) is the response to x g. Of a linear one g is solved for at every sample
-(:func:`~focgen.rig.linear.run_levered`). Where friction or another spring come in, g is taken at the y found
+(:func:`~focgen.rig.solved.run_levered`). Where friction or another spring come in, g is taken at the y found
 last: what is missing falls at each turn by the part of y that g changes by.
 """
 

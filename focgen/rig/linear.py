@@ -15,7 +15,6 @@ from focgen.logs.between import Between
 from focgen.rig import kernels
 from focgen.rig.courses import course, sharpened
 from focgen.rig.delay import delayed, shifted
-from focgen.rig.dynamics import Dynamics, Lever
 from focgen.rig.modes import (
     Modes,
     about_as_long,
@@ -74,7 +73,7 @@ def _smooth(transfer: TransferFunction, x: Array, rest: Bytes, h: float) -> Arra
     """The response of whole orders to an input that runs in lines and bends."""
     x = np.ascontiguousarray(x, float)
     line, bend, twist = course(x, rest, Between.SMOOTH)
-    (b, a), pulses = _discrete(transfer, h, True), _bent(transfer, h)
+    (b, a), pulses = discrete(transfer, h, True), _bent(transfer, h)
     made = kernels.rational(x, rest, b, a)
     for part, weights in zip((line, bend, twist), pulses):
         if np.any(part):
@@ -85,8 +84,8 @@ def _smooth(transfer: TransferFunction, x: Array, rest: Bytes, h: float) -> Arra
 @lru_cache(maxsize=512)
 def _bent(transfer: TransferFunction, h: float) -> tuple[Array, ...]:
     """Numerators in powers of z^-1 of what a sample's inputs t, t (t − 1) and t (t − 1)(2 t − 1), t = 0 … 1,
-    leave, over the denominator of :func:`_discrete`: from the first samples of the exact responses."""
-    _, a = _discrete(transfer, h, True)
+    leave, over the denominator of :func:`discrete`: from the first samples of the exact responses."""
+    _, a = discrete(transfer, h, True)
     count = len(a)
     power = [
         _powers(transfer, h, k, count) for k in range(4)
@@ -116,7 +115,7 @@ def _at_samples(
     transfer: TransferFunction, x: Array, rest: Bytes, h: float, duration: float, held: bool
 ) -> Array:
     if transfer.is_integer:
-        return kernels.rational(x, rest, *_discrete(transfer, h, held))
+        return kernels.rational(x, rest, *discrete(transfer, h, held))
     lag = single_lag(transfer)
     if lag:
         gain, T, alpha = lag
@@ -158,70 +157,7 @@ def is_spring(transfer: TransferFunction) -> bool:
     return holds_level(transfer) and transfer.is_integer
 
 
-def _in_lines(x: Array, rest: Bytes, between: Between | bool) -> Array:
-    """The input (n,) for loops that take it in straight lines: a smooth one with its bends sharpened."""
-    return sharpened(np.ascontiguousarray(x, float), rest) if between == Between.SMOOTH else x
-
-
-def run_bent(
-    transfer: TransferFunction,
-    x: Array,
-    rest: Bytes,
-    h: float,
-    between: Between | bool,
-    dynamics: Dynamics,
-    delay: float = 0.0,
-) -> Array:
-    """As :func:`run` of a plant :func:`is_spring` whose spring follows ``dynamics``; the response counts as
-    linear between samples, and the delay is exact in whole samples only."""
-    x = _in_lines(x, rest, between)
-    b, a = _discrete(transfer, h, between == Between.HELD)
-    c, _ = _discrete(transfer, h, False)
-    made = kernels.bent_rational(x, rest, b, c, a, dynamics.bending(transfer.dc_gain))
-    return delayed(made, rest, h, delay) if delay else made
-
-
-def run_paced(
-    transfer: TransferFunction,
-    x: Array,
-    rest: Bytes,
-    h: float,
-    duration: float,
-    between: Between | bool,
-    slowness: kernels.Slowness,
-) -> Array:
-    """As :func:`run` of a stage that :func:`holds_level`, at its fastest, whose pace ``slowness`` tells."""
-    x = _in_lines(x, rest, between)
-    if transfer.is_integer:
-        b, a = _discrete(transfer, h, between == Between.HELD)
-        c, _ = _discrete(transfer, h, False)
-        return kernels.paced_rational(x, rest, b, c, a, slowness)
-    gain, row, missing = _row(transfer, h, about_as_long(duration))
-    by, (own, *pace), share = slowness
-    made = kernels.paced_modes(x, rest, *row, (by, (own / gain, *pace), share))
-    return gain * settled(made, x, rest, missing)
-
-
-def run_levered(
-    transfer: TransferFunction,
-    x: Array,
-    rest: Bytes,
-    h: float,
-    duration: float,
-    between: Between | bool,
-    lever: Lever,
-) -> Array:
-    """As :func:`run` of a stage that :func:`holds_level`, whose input pulls as strongly as ``lever`` says."""
-    x = _in_lines(x, rest, between)
-    if transfer.is_integer:
-        own = lever.first, lever.second, lever.scale
-        return kernels.levered_rational(x, rest, *_discrete(transfer, h, between == Between.HELD), own)
-    gain, row, missing = _row(transfer, h, about_as_long(duration))
-    made = gain * kernels.levered_modes(x, rest, *row, (lever.first, lever.second, lever.scale / gain))
-    return settled(made, x * lever.strength(made), rest, gain * missing)
-
-
-def _row(
+def row_of(
     transfer: TransferFunction, h: float, duration: float
 ) -> tuple[float, tuple[Array, Array, Array, Array, float], float]:
     """What multiplies the response of the modes, the one row of them that a compiled loop needs, and the gain
@@ -262,7 +198,7 @@ def single_lag(transfer: TransferFunction) -> tuple[float, float, float] | None:
 
 
 @lru_cache(maxsize=512)
-def _discrete(transfer: TransferFunction, h: float, held: bool) -> tuple[Array, Array]:
+def discrete(transfer: TransferFunction, h: float, held: bool) -> tuple[Array, Array]:
     """Numerator and denominator in powers of z^-1, exact at the samples: the modes one by one, put together
     again."""
     num, den = coefficients(transfer.num), coefficients(transfer.den)
@@ -300,7 +236,7 @@ def _held(poles: Complex, residues: Complex, h: float, held: bool) -> tuple[Comp
 
 @lru_cache(maxsize=512)
 def _discrete_between(transfer: TransferFunction, h: float, held: bool, share: float) -> tuple[Array, Array]:
-    """As :func:`_discrete`, but the response at the ``share`` of the way from the sample before to each."""
+    """As :func:`discrete`, but the response at the ``share`` of the way from the sample before to each."""
     num, den = coefficients(transfer.num), coefficients(transfer.den)
     through = num[0] / den[0] if len(num) == len(den) else 0.0
     poles = np.roots(den).astype(complex)

@@ -6,6 +6,7 @@
  * `rest` is as in kernels.c.
  */
 #include <math.h>
+#include "kernels.h"
 #include "modes.h"
 
 enum { BALANCED = 2, BY_LEVEL = 1, BY_SPEED = 2, TURNS = 40 };

@@ -15,6 +15,7 @@
  */
 #include <math.h>
 #include "bent.h"
+#include "kernels.h"
 
 enum { BALANCED = 2, DIPS = 3 };
 static const double NEAR = 0.1, BESIDE = 0.03; /* how far Taylor series go: of q, as a part of it; of powers and exponentials */

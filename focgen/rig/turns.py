@@ -25,9 +25,15 @@ def in_a_row(acts: Sequence[Act]) -> Act:
 
 def by_turns(y: Array, again: Callable[[Array], Array], turns: int, close: float) -> Array:
     """The response (n,) that ``again`` makes of itself, from ``y``: after so many ``turns``, or once a turn
-    changes no more than ``close`` of the largest."""
+    changes no more than ``close`` of the largest. What changes as much as the turn before goes to and fro:
+    half of the way is gone then."""
+    last = np.inf
     for _ in range(turns):
         before, y = y, again(y)
-        if np.max(np.abs(y - before)) <= close * np.max(np.abs(y)):
+        change = np.max(np.abs(y - before))
+        if change <= close * np.max(np.abs(y)):
             break
+        if change >= last:
+            y = 0.5 * (y + before)
+        last = change
     return y

@@ -11,7 +11,7 @@ import numpy as np
 from focgen.arrays import Array
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
-from focgen.rig import linear
+from focgen.rig import linear, solved
 from focgen.rig.delay import delayed
 from focgen.rig.dynamics import Pace
 from focgen.rig.effects import Run
@@ -35,7 +35,7 @@ def run(
         even = linear.run(transfer, x, run.rest, run.h, run.duration, between) / transfer.dc_gain
         scale = float(np.max(np.abs(even if pace.by == "level" else x - even))) or 1.0
     slowness = _BY[pace.by], (transfer.dc_gain, fastest, pace.rate, scale), share
-    y = linear.run_paced(_at(transfer, fastest), x, run.rest, run.h, run.duration, between, slowness)
+    y = solved.run_paced(_at(transfer, fastest), x, run.rest, run.h, run.duration, between, slowness)
     return delayed(y, run.rest, run.h, delay) if delay else y
 
 

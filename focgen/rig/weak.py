@@ -2,18 +2,23 @@
 
 With a stiffness s(t) in units of the nominal one, T D^α y + s y = x is T D^α y + y = x + (1 − s) y. So y is
 the nominal response to x and to what the spring no longer bears, found by putting in the y found last: what
-is missing falls by the part 1 − s each time.
+is missing falls by the part 1 − s each time. Where the nominal actuator is linear and the form says what its
+spring gives way with, y is solved for at every sample instead.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
 
 from focgen.arrays import Array
-from focgen.rig.effects import Run
+from focgen.fractional.transfer import TransferFunction
+from focgen.logs.between import Between
+from focgen.rig import solved
+from focgen.rig.effects import Form, Run
+from focgen.rig.kernels import Wear
 from focgen.rig.turns import Act, by_turns, in_a_row
 
 _TURNS = 12
@@ -21,10 +26,20 @@ _FEW = 3  # where hypotheses are only ranked: a spring that bears four fifths is
 _CLOSE = 1e-4  # of the largest response: what a turn may still change
 _LEAST = 0.2  # of the stiffness: with less, the turns would not come to an end
 _MOST = 1.8  # of it
+_BY = {"time": 0, "largest": 1, "work": 2, "retreat": 3}  # as in ``weak.c``, which has the same bounds
+_FROM = {"largest": "largest", "work": "work", "retreat": "largest"}  # what an earlier session leaves of it
 
 
 class Weak(Protocol):
     """An effect that gives how much further a weaker spring is bent at rest."""
+
+    @property
+    def form(self) -> Form:
+        """What it is a form of."""
+
+    @property
+    def carried(self) -> Mapping[str, float]:
+        """What outlived an earlier session."""
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -39,9 +54,25 @@ def weakened(steps: Sequence[Any], weak: Sequence[Any], gain: float) -> list[Any
     nothing is, the same steps."""
     if not weak:
         return list(steps)
-    kept = [(("weak", p.effect, p.form.name, p.values), lambda y, run: y, p) for p in weak]
+    kept = after(weak)
     keys: tuple[Hashable, ...] = tuple(key for key, *_ in (*steps, *kept))
     return [(keys, _bent([act for _, act, _ in steps], weak, gain), None), *kept]
+
+
+def after(weak: Sequence[Any]) -> list[Any]:
+    """Steps that change nothing: what is weak is told there what it leaves."""
+    return [(("weak", p.effect, p.form.name, p.values), lambda y, run: y, p) for p in weak]
+
+
+def solved_weak(of: TransferFunction, weak: Sequence[Any], between: Between | bool) -> list[Any]:
+    """The steps of a linear actuator with what is ``weak`` in it and :func:`can_be_solved`."""
+    kept = after(weak)
+
+    def act(x: Array, run: Run) -> Array:
+        worn = wear(weak, of.dc_gain, run)
+        return solved.run_weak(of, x, run.rest, run.h, run.duration, between, worn)
+
+    return [((of, between, *(key for key, *_ in kept)), act, None), *kept]
 
 
 def _bent(acts: Sequence[Act], weak: Sequence[Weak], gain: float) -> Act:
@@ -54,6 +85,25 @@ def _bent(acts: Sequence[Act], weak: Sequence[Weak], gain: float) -> Act:
         return by_turns(nominal(x, run), further, _FEW if run.rough else _TURNS, _CLOSE)
 
     return respond
+
+
+def can_be_solved(weak: Sequence[Weak]) -> bool:
+    """Whether all that gives way says by what, and no more than one by anything but time."""
+    return all(p.form.wears for p in weak) and sum(p.form.wears != "time" for p in weak) <= 1
+
+
+def wear(weak: Sequence[Weak], gain: float, run: Run) -> Wear:
+    """What the compiled loops know of what :func:`can_be_solved`, of an actuator that answers 1 with
+    ``gain`` when held."""
+    given = ones = np.ones(len(run.rest))
+    by, growth, scale, before = 0, 0.0, 1.0, 0.0
+    for p in weak:
+        if p.form.wears == "time":
+            given = given / np.maximum(p.act(ones, run), 1e-3)
+        else:
+            by, (growth, scale) = _BY[p.form.wears], p.values
+            before = p.carried.get(_FROM[p.form.wears], 0.0)
+    return by, (growth, scale, before, gain), given
 
 
 def stiffness(y: Array, weak: Sequence[Weak], run: Run) -> Array:

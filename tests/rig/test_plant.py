@@ -11,7 +11,7 @@ from scipy.signal import lsim
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
-from focgen.rig import linear
+from focgen.rig import linear, solved
 from focgen.rig.changeable import fits_in, is_damped
 from focgen.rig.dynamics import Bend, Dynamics, Friction, Rise, Spring
 from focgen.rig.effects import Run, form_of
@@ -346,12 +346,12 @@ def test_friction_in_a_spring_that_bends():
     both = Dynamics(bend=Bend(0.3, 0.5, 1.0), drag=Friction(0.3, 0.4))
     of = transfer(1.0, 0.02, 0.3, 1.5)
     exact = respond(plant_of(of), x, first, h, both)
-    np.testing.assert_allclose(linear.run_bent(of, x, first, h, False, both), exact, atol=3e-3)
+    np.testing.assert_allclose(solved.run_bent(of, x, first, h, False, both), exact, atol=3e-3)
     slow = respond(Plant(1, 0.3, 0.0, 1.0), x, first, h, both)
     np.testing.assert_allclose(lag(x, first, h, 0.3, 1.0, 6.0, both), slow, atol=3e-3)
     bent = respond(plant_of(of), x, first, h, Dynamics(bend=both.bend))
     np.testing.assert_allclose(
-        linear.run_bent(of, x, first, h, False, Dynamics(bend=both.bend)), bent, atol=1e-5
+        solved.run_bent(of, x, first, h, False, Dynamics(bend=both.bend)), bent, atol=1e-5
     )
     assert np.max(np.abs(bent - exact)) > 0.1
 

@@ -126,6 +126,8 @@ class Run:
 Values = tuple[float, ...]
 Act = Callable[[Any, Values, Any], Any]  # in a slot of EQUATIONS no signal passes: see Form
 
+Leaves = Callable[[Array, Values, Run], dict[str, float]]
+
 
 @dataclass(frozen=True)
 class Form:
@@ -141,6 +143,9 @@ class Form:
     ``leads``: linear though it is, away from home it stays ahead of the actuator's gain, which may be bent.
     ``both_ways``: it is to be told from another form only where the input goes both ways.
     ``rarer``: before the data, less likely than the like of another stage.
+    ``wears``: what a spring's further bend goes with: ``time`` alone, or, with its two values, as 1 + growth
+    (1 − exp(−w/scale)), w the ``largest`` that it was bent by, the ``work`` done or its ``retreat`` from the
+    largest; empty where it is another function.
     ``bare``: only in a stage that the rig takes for 1: dynamics have the like in their own equation.
     ``itself(values, den)``: whether it is what its family says, in an actuator of this denominator.
     """
@@ -150,13 +155,14 @@ class Form:
     parameters: tuple[Parameter, ...]
     act: Act
     seen: Callable[[Array], Values | None] | None = None
-    leaves: Callable[[Array, Values, Run], dict[str, float]] | None = None
+    leaves: Leaves | None = None
     response: Callable[[Values, Complex], Complex] | None = None
     wanders: bool = False
     jumps: bool = False
     leads: bool = False
     both_ways: bool = False
     rarer: bool = False
+    wears: str = ""
     bare: bool = False
     itself: Callable[[Values, Polynomial], bool] = lambda values, den: True
 

@@ -13,7 +13,11 @@ def _grown(x: Array, trend: Array) -> Array:
 
 _DRIVE = _trends.forms("drive", 0, _grown)
 # of the spring, which pulls back the more slowly the weaker it is
-_SPRING = [replace(f, name=f"spring_{f.name}") for f in _trends.forms("spring", 0, _grown) if not f.wanders]
+_SPRING = [
+    replace(f, name=f"spring_{f.name}", wears="time")
+    for f in _trends.forms("spring", 0, _grown)
+    if not f.wanders
+]
 
 EFFECT = Effect(
     name="gain_drift",

@@ -4,7 +4,7 @@ import numpy as np
 
 from focgen.arrays import Array
 from focgen.rig.effects import _curves
-from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter, Run, Values
+from focgen.rig.effects._effect import LARGEST, Act, Effect, Form, Leaves, Parameter, Run, Values
 
 _GROWTH = Parameter("growth", lower=0.0, upper=3.0, starts=(0.1, 0.1), zero=0.0)
 
@@ -53,6 +53,10 @@ def _leaves_work(x: Array, values: Values, run: Run) -> dict[str, float]:
     return {"work": float(_done(x, run)[-1])}
 
 
+def _spring(name: str, scale: Parameter, act: Act, leaves: Leaves, wears: str) -> Form:
+    return Form(name, "spring", (_GROWTH, scale), act, leaves=leaves, wears=wears)
+
+
 EFFECT = Effect(
     name="softening",
     stage="actuator",
@@ -72,10 +76,10 @@ EFFECT = Effect(
         Form("reloading", "drive", (_GROWTH, _scale(0.1, 0.5)), _reloading, leaves=_leaves_peak),
         Form("work", "drive", (_GROWTH, _scale(1.0, 5.0)), _work, leaves=_leaves_work),
         # the spring itself gives way, and what it pulls back is the slower
-        Form("worn", "spring", (_GROWTH, _scale(0.3, 1.0)), _saturating, leaves=_leaves_peak),
+        _spring("worn", _scale(0.3, 1.0), _saturating, _leaves_peak, "largest"),
         # rubber is as stiff as new at strains that it has not seen (Ogden and Roxburgh 1999)
-        Form("pseudo_elastic", "spring", (_GROWTH, _scale(0.1, 0.5)), _reloading, leaves=_leaves_peak),
-        Form("worn_by_work", "spring", (_GROWTH, _scale(1.0, 5.0)), _work, leaves=_leaves_work),
+        _spring("pseudo_elastic", _scale(0.1, 0.5), _reloading, _leaves_peak, "retreat"),
+        _spring("worn_by_work", _scale(1.0, 5.0), _work, _leaves_work, "work"),
         _curves.spline("drive", _peak, _leaves_peak),
     ],
 )
