@@ -209,6 +209,14 @@ class Numbers:
         _SAME,
         _SAME,
     )
+    restless: float = _number(
+        4.0,
+        "mean square where the rig moves over that where it rests, of what acts on it",
+        "ratio",
+        "healthy rigs: at most 1.1; named rightly: 3.3; outside the library: 2.0 to 20",
+        "not measured",
+        "not measured",
+    )
     stays: float = _number(
         0.5,
         "left by effects that do not explain it: of a disturbance, or of a gap on parts not seen",

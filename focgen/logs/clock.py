@@ -26,6 +26,8 @@ _IRREGULAR = 0.95  # quantile of the steps that stands for the pace of an irregu
 _SAME_RATE = 1e-4  # relative
 _NEAR = 0.02  # relative: a clock's rate is the rig's
 _PLAUSIBLE = 99.0  # a log is recorded at a rate within this factor of the rig's
+_PART = 4096  # samples looked at together
+_SLIGHT = 1e-9  # of a signal's reach: less is rounding
 _LONGEST = 5_000_000  # samples that few rows may be resampled to; many rows, twice as many as they are
 _COUNTABLE = 2**53  # ticks that float64 tells apart
 _OTHERS = {
@@ -215,8 +217,8 @@ def on_grid(
     """Return (sample time in s, signals on a uniform grid, notes).
 
     Uniform logs keep their own rate, whatever the rig's, and samples that they lack are bridged; others are
-    resampled at ``sample_time`` (s): command and reference as held, everything else linear between the
-    stamps.
+    resampled at ``sample_time`` (s): the command in its means over each sample, as it was held from stamp to
+    stamp, the reference as held, everything else linear between the stamps.
     """
     ticks, step = _ticks(time)
     if ticks is None:
@@ -274,8 +276,28 @@ def _resampled(
     count = int((time[-1] - time[0]) / sample_time + 1e-6) + 1
     _check_length(count, sample_time, where, len(time))
     grid = time[0] + sample_time * np.arange(count)
-    resampled = {role: between(role, grid, time, values) for role, values in signals.items()}
+    resampled = {
+        role: _held_means(grid, sample_time, time, x) if role == "command" else between(role, grid, time, x)
+        for role, x in signals.items()
+    }
     return sample_time, resampled, (f"time stamps not uniform: resampled every {sample_time:g} s",)
+
+
+def _held_means(grid: Array, step: float, at: Array, values: Array) -> Array:
+    """The mean, over the sample that begins at each of ``grid`` (n,), of what is held at ``values`` (m,) from
+    ``at`` on: a step between two samples is not put off to the next, which a rig that adds up would keep."""
+    summed = np.empty(len(at))  # up to each of ``at``; by parts and in place, for logs may be long
+    summed[0] = 0.0
+    np.subtract(at[1:], at[:-1], out=summed[1:])
+    summed[1:] *= values[:-1]
+    np.cumsum(summed, out=summed)
+    made, slight = np.empty(len(grid)), _SLIGHT * float(np.ptp(values))
+    for first in range(0, len(grid), _PART):
+        ends = np.append(grid[first : first + _PART], grid[min(first + _PART, len(grid)) - 1] + step)
+        reached = np.interp(ends, at, summed) + values[-1] * np.maximum(ends - at[-1], 0.0)
+        held, means = between("command", ends[:-1], at, values), np.diff(reached) / step
+        made[first : first + _PART] = np.where(np.abs(means - held) > slight, means, held)
+    return made
 
 
 def _check_length(count: int, step: float, where: str, rows: int) -> None:

@@ -27,7 +27,8 @@ class Experiment:
     ``begins``: by role, what a signal was before the first sample; others were at rest at 0. ``anew``:
     ahead of it the log's clock fell back. ``paused``: how long the rig rested before it is not known, and
     ``start`` is as if no time had passed. ``lasts``: a loop or a play lies where the experiment before left
-    it, and not at 0. ``readings``: by role, the rows that hold one, where a logger filled in the others.
+    it, and not at 0. ``stands``: where an actuator that integrates stood as it began, in its output's unit.
+    ``readings``: by role, the rows that hold one, where a logger filled in the others.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Experiment:
     anew: bool = False
     paused: bool = False
     lasts: bool = False
+    stands: float = 0.0
     readings: Mapping[str, Ints] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -95,9 +97,10 @@ class Experiment:
         cut = {role: values[keep] for role, values in self.signals.items()}
         time, rows = self._rows_between(lo, hi)
         start = self.start + begin * self.sample_time
-        begins = self.begins if begin == 0 else {}
+        begins, stands = (self.begins, self.stands) if begin == 0 else ({}, 0.0)
         kept = {} if len(self) > np.sum(keep) else self.readings
-        return replace(self, signals=cut, start=start, raw_time=time, rows=rows, begins=begins, readings=kept)
+        told = {"begins": begins, "stands": stands, "readings": kept}
+        return replace(self, signals=cut, start=start, raw_time=time, rows=rows, **told)
 
     def _rows_between(self, low: float, high: float) -> tuple[Array | None, Mapping[str, Array] | None]:
         """The raw time stamps and rows from ``low`` to ``high`` (s since the first)."""

@@ -22,6 +22,7 @@ from focgen.rig.lever import levered
 from focgen.rig.modes import respond
 from focgen.rig.rig import UNITY, Actuator, LinearActuator, Rig
 from focgen.rig.stages import STAGES
+from focgen.rig.stood import from_there
 from focgen.rig.weak import can_be_solved, solved_weak, weakened
 
 
@@ -122,6 +123,8 @@ class Chain:
                 if left is not None and placed is not None:
                     left[_index(self.placed, placed)] = placed.leaves(x, run)
                 x = self._once((stage, number), key, x, act, run)
+            if stage == "actuator" and run.stands:
+                x, run = self._once("stood", run.stands, x, from_there, run), run.stood
             if tap is not None:
                 tap[stage] = x
             if between != Between.STRAIGHT and not self._passes(stage):

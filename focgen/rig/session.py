@@ -16,7 +16,8 @@ def run_of(logs: Sequence[Experiment], entry: str, ahead: float = 0.0) -> Run:
     later than theirs."""
     lengths, starts = [len(log) for log in logs], [log.start + ahead for log in logs]
     begins, lasts = [log.before(entry) for log in logs], any(log.lasts for log in logs)
-    return Run.of(lengths, starts, logs[0].sample_time, begins, lasts)
+    stands = [0.0 if entry == "curvature" else log.stands for log in logs]
+    return Run.of(lengths, starts, logs[0].sample_time, begins, lasts, stands)
 
 
 def joined(logs: Sequence[Experiment], role: str) -> Array:

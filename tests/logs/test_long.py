@@ -119,7 +119,7 @@ def test_experiments_take_little_beside_their_columns(monkeypatch, what):
     monkeypatch.setattr(outliers, "_PART", 512)
     change, most = ODD[what]
     count = 60_000
-    read_logs(change(measured(6000)), SIGNALS, 0.01)  # what is loaded and kept once
+    read_logs(change(measured(count)), SIGNALS, 0.01)  # what is loaded and kept once
     log = change(measured(count))
     tracemalloc.start()
     try:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
+import numpy as np
+
 from focgen.diagnosis.controller.check import ControllerCheck
 from focgen.diagnosis.hypotheses.converter import is_rounded
 from focgen.diagnosis.hypotheses.explain import Explanation
@@ -12,6 +14,7 @@ from focgen.diagnosis.hypotheses.rivals import Cause
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.verdict.confidence import nominal_instead
 from focgen.diagnosis.verdict.predicted_improvement import paths
+from focgen.diagnosis.verdict.restless import is_restless, louder
 from focgen.diagnosis.verdict.summary import Summary, doubts
 from focgen.diagnosis.verdict.unexplained import disturbed, is_driven
 
@@ -60,6 +63,11 @@ def the_rest(summary: Summary) -> Iterator[str]:
             yield (
                 f"{_within(e)}: what is left has passed through the rig, {disturbed(e).above:.1f} times what "
                 "is quick in it, and no input predicts it: something else acts there, which it may stand for"
+            )
+        elif is_restless(e):
+            yield (
+                f"{_within(e)}: what is left is {np.sqrt(louder(e)):.1f} times as large where the rig moves "
+                "as where it rests, which noise is not: something else acts there, which it may stand for"
             )
 
 

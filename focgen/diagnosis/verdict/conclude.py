@@ -32,7 +32,7 @@ from focgen.diagnosis.verdict.moves import far_moves
 from focgen.diagnosis.verdict.nominal import likelier_nominal, nominal_alone, unnamed
 from focgen.diagnosis.verdict.sizes import estimates
 from focgen.diagnosis.verdict.summary import Summary, doubts, sorted_out, sound_parts
-from focgen.diagnosis.verdict.unexplained import disturbed, is_driven
+from focgen.diagnosis.verdict.unexplained import acts_besides, disturbed
 from focgen.diagnosis.verdict.where import locate, stage_shares
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import notes_of
@@ -155,7 +155,7 @@ def _found(
     rigs = summary.rigs
     kept, sure = tied(cause.rivals)
     sure = sure * NUMBERS.unlikely if e.freed else sure  # numbers far off explain the same
-    sure = sure * NUMBERS.unlikely if summary.stands_for_more or is_driven(e) else sure
+    sure = sure * NUMBERS.unlikely if summary.stands_for_more or acts_besides(e) else sure
     sure = sure * _lasting(e, cause) * _beside(e, cause)
     total = summary.total or Improvement(0.0, (0.0, 0.0))
     lost = _share_lost(cause, rigs, logs, summary.squares, summary.floor, total)

@@ -93,14 +93,16 @@ def sorted_out(
 
     out = [] if granted else crossed(rig, logs, explanations)
     unknown = [e for e in explanations if e in out or is_unknown(e)]
-    summary = summary_without([*unknown, *_no_closer(rig, logs, rigs, explanations)])
+    apart = [e for e in _no_closer(rig, logs, rigs, explanations) if e not in unknown]
+    summary = summary_without([*unknown, *apart])
     if granted:
         return SortedOut(summary, unknown, [], [])
     if summary.in_vain and (vain := _in_vain(summary)):
         unknown += vain
         summary = summary_without(unknown)
-    if not unknown and explanations[-1].segment.pace and _unaccounted(summary):
-        unknown += explanations[-1:]
+    bare = apart or [e for e in explanations if e.segment.pace]
+    if not unknown and bare and _unaccounted(summary):
+        unknown += bare
     beside = summary.causes if unknown and summary.more_is_left else []
     if beside:
         unknown += dict.fromkeys(e for e, _ in beside)
@@ -152,7 +154,8 @@ def sound_parts(explanations: Sequence[Explanation]) -> dict[Explanation, Explan
 
 def _unaccounted(summary: Summary) -> bool:
     """Whether nothing was found, and yet the output is off by far more than noise. Where errors add up, no
-    segment need show it: gusts in a path are gone from its own errors at their pace."""
+    segment need show it: gusts in a path are gone from its own errors at their pace. And what a segment's own
+    effects bring no closer is there nevertheless."""
     return not summary.causes and summary.floor < NUMBERS.vain * float(np.mean(summary.squares["explained"]))
 
 

@@ -13,6 +13,7 @@ from focgen.diagnosis.verdict.clocks import are_apart
 from focgen.diagnosis.verdict.late import is_late
 from focgen.diagnosis.verdict.moments import another
 from focgen.diagnosis.verdict.outside import from_outside
+from focgen.diagnosis.verdict.restless import is_restless
 from focgen.diagnosis.verdict.uneven import is_uneven
 from focgen.rig.effects import library
 
@@ -51,26 +52,42 @@ def disturbed(e: Explanation) -> Disturbance:
     return disturbance(e.segment.parts(e.best.weighed), e.segment.run.h, response)
 
 
+def acts_besides(e: Explanation) -> bool:
+    """Whether something else acts where effects were found: what they leave is driven by it, or is far louder
+    where the rig moves."""
+    return bool(e.causes) and (is_driven(e) or is_restless(e))
+
+
 def is_driven(e: Explanation) -> bool:
     """Whether what effects leave of a segment has passed through the rig, far above its noise, and inputs
-    predict little of it: something else acts there. What goes round in a loop, or adds up, is left so by
-    noise."""
+    predict little of it. What goes round in a loop, or adds up, is left so by noise."""
     if not e.causes or e.segment.closed or e.segment.pace or is_rounded(e.causes):
         return False
     return e.predictability.share < NUMBERS.left and disturbed(e).pushed
 
 
 def is_noise(e: Explanation) -> bool:
-    """Whether what a segment leaves is noise, but for a little that its input predicts."""
+    """Whether what a segment leaves is noise, but for a little that its input predicts. Where errors add up,
+    all that is left has to be, however long ago it came about."""
+    if e.segment.pace and _added_up(e):
+        return False
     left = disturbed(e)
-    quiet = not (left.bursts or left.low_frequency or left.tonal or left.pushed)
+    quiet = not (left.bursts or left.low_frequency or left.tonal or left.pushed or is_restless(e))
     return not is_unknown(e) or (quiet and e.predictability.share <= NUMBERS.much)
 
 
+def _added_up(e: Explanation) -> bool:
+    """Whether the output of a rig that integrates is off by far more than its noise."""
+    segment, response = e.segment, e.nominal.problem.references.clocks["response"]
+    off = segment.y - e.best.problem.simulate(e.best.vector)
+    return disturbance(segment.parts(off), segment.run.h, response).above > NUMBERS.pushed
+
+
 def _is_disturbed(e: Explanation, left: Disturbance) -> bool:
-    """Whether bursts, slow swings, a hum or what pushes the rig are there, and the effects found, if any,
-    take hardly any of the residual away. What a rounding leaves comes in bursts by nature."""
-    loud = left.bursts or left.low_frequency or left.tonal or left.pushed
+    """Whether bursts, slow swings, a hum, what pushes the rig or is louder as it moves are there, and the
+    effects found, if any, take hardly any of the residual away. What a rounding leaves comes in bursts by
+    nature."""
+    loud = left.bursts or left.low_frequency or left.tonal or left.pushed or is_restless(e)
     if not e.causes:
         return loud
     before, after = _squares(e)

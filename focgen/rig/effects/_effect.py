@@ -80,6 +80,7 @@ class Run:
     ``duration`` of the longest experiment in s; ``carried``: what of an effect outlived an earlier session.
     ``begins``: what the input was before each experiment, in its order; none where all come from rest.
     ``lasts``: what remembers lies, as an experiment begins at rest, where its last turn left it.
+    ``stands``: where an actuator that integrates stood as each began; none where it was at 0 in all.
     ``rough``: what is integrated in steps may take them twice as long, for fits that are but compared.
     """
 
@@ -90,6 +91,7 @@ class Run:
     carried: Mapping[str, float] = field(default_factory=dict)
     begins: tuple[Begin, ...] = ()
     lasts: bool = False
+    stands: tuple[float, ...] = ()
     rough: bool = False
 
     @cached_property
@@ -99,6 +101,14 @@ class Run:
         later = np.flatnonzero(rest)[1:]
         rest[later[rest[later] == 1]] = 0
         return replace(self, rest=rest)
+
+    @cached_property
+    def stood(self) -> Run:
+        """The run behind an actuator that integrates, at rest where that stood as each experiment began."""
+        rest = self.rest.copy()
+        firsts = np.flatnonzero(rest)
+        rest[firsts[np.array(self.stands) != 0.0]] = 2
+        return replace(self, rest=rest, stands=())
 
     @property
     def spans(self) -> list[tuple[int, int]]:
@@ -114,13 +124,15 @@ class Run:
         h: float,
         begins: Sequence[Begin] = (),
         lasts: bool = False,
+        stands: Sequence[float] = (),
     ) -> Run:
         """The run of experiments of ``lengths`` samples beginning at ``starts`` s on the session's clock."""
         rest = np.zeros(sum(lengths), np.uint8)
         rest[np.cumsum([0, *lengths[:-1]])] = 1
         clock = np.concatenate([s + h * np.arange(n) for n, s in zip(lengths, starts)])
         begins = () if all(b.at_rest for b in begins) else tuple(begins)
-        return cls(h, rest, clock, max(lengths) * h, begins=begins, lasts=lasts)
+        stands = tuple(stands) if any(stands) else ()
+        return cls(h, rest, clock, max(lengths) * h, begins=begins, lasts=lasts, stands=stands)
 
 
 Values = tuple[float, ...]
