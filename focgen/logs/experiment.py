@@ -99,8 +99,8 @@ class Experiment:
         start = self.start + begin * self.sample_time
         begins, stands = (self.begins, self.stands) if begin == 0 else ({}, 0.0)
         kept = {} if len(self) > np.sum(keep) else self.readings
-        told = {"begins": begins, "stands": stands, "readings": kept}
-        return replace(self, signals=cut, start=start, raw_time=time, rows=rows, **told)
+        found = replace(self, signals=cut, start=start, raw_time=time, rows=rows)
+        return replace(found, begins=begins, stands=stands, readings=kept)
 
     def _rows_between(self, low: float, high: float) -> tuple[Array | None, Mapping[str, Array] | None]:
         """The raw time stamps and rows from ``low`` to ``high`` (s since the first)."""

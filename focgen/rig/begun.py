@@ -38,6 +38,12 @@ def with_past(x: Array, run: Run) -> Array:
     return np.concatenate(made)
 
 
+def from_there(x: Array, run: Run) -> Array:
+    """What leaves an actuator that integrates (n,), ``x`` had it stood at 0 as each experiment began."""
+    made: Array = x + np.repeat(run.stands, [b - a for a, b in run.spans])
+    return made
+
+
 def past_of(run: Run) -> tuple[Run, Array]:
     """The run with the pasts of its experiments, and where (n,) the samples of the experiments are in it."""
     found = _EXTENDED.get(run)

@@ -13,7 +13,7 @@ from focgen.logs.between import Between
 from focgen.present import present
 from focgen.rig import chamber, lags, linear, solved, uneven
 from focgen.rig import plant as plants
-from focgen.rig.begun import past_of, with_past
+from focgen.rig.begun import from_there, past_of, with_past
 from focgen.rig.changeable import IN_STEPS
 from focgen.rig.delay import delayed
 from focgen.rig.dynamics import FREE, SAME, STEADY, UNCHANGED, Dynamics, Lever, Pace
@@ -22,7 +22,6 @@ from focgen.rig.lever import levered
 from focgen.rig.modes import respond
 from focgen.rig.rig import UNITY, Actuator, LinearActuator, Rig
 from focgen.rig.stages import STAGES
-from focgen.rig.stood import from_there
 from focgen.rig.weak import can_be_solved, solved_weak, weakened
 
 

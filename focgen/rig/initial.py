@@ -86,7 +86,7 @@ def begun(rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] = ()) -
     if not all(map(len, logs)):
         return tuple(logs)
     if any(not np.isfinite(gain) for gain in _gains(rig)):
-        return tuple(_stood(rig, log, placed) for log in logs)
+        return tuple(standing(rig, log, placed, NOTE) for log in logs)
     scales = _Scales.of(rig, logs)
     entries = [role for role in ENTERS if role in scales.sizes and scales.behind(role)]
     return tuple(_begun(rig, log, placed, entries, scales) for log in logs)
@@ -140,18 +140,6 @@ def _begun(
     found = {entry: begin for entry, begin in found.items() if not begin.at_rest}
     notes = tuple(note for note in log.notes if note != NOTE)
     return replace(log, begins=found, notes=(*notes, NOTE) if found else notes)
-
-
-def _stood(rig: Rig, log: Experiment, placed: Sequence[Placed]) -> Experiment:
-    if not np.isfinite(rig.regulator.dc_gain) or not np.isfinite(rig.sensor.dc_gain) or len(log) < 2 * FIRST:
-        return log
-    entry = "command" if "command" in log else "pressure"
-    role, last = ("curvature", "actuator") if "curvature" in log else ("output", "sensor")
-    if entry not in log or role not in log:
-        return log
-    run, chain = Run.of([len(log)], [log.start], log.sample_time), Chain(rig, tuple(placed))
-    made = chain.run(np.asarray(log[entry], float), ENTERS[entry], last, run, between_of(rig, entry))
-    return standing(log, role, made, 1.0 if role == "curvature" else rig.sensor.dc_gain, NOTE)
 
 
 def _gains(rig: Rig) -> list[float]:

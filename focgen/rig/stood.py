@@ -6,6 +6,7 @@ where.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,29 +16,39 @@ from focgen.logs.begin import Begin
 from focgen.logs.between import white_level
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import Run
+from focgen.rig.engine import Chain, Placed, between_of
+from focgen.rig.rig import Rig
+from focgen.rig.stages import ENTERS
 
 _FIRST = 5  # samples that show it, at least
 _APART = 5.0  # standard errors by which the first samples are off from 0
 
 
-def from_there(x: Array, run: Run) -> Array:
-    """What leaves the actuator (n,), ``x`` where it stood at 0 as each experiment began."""
-    made: Array = x + np.repeat(run.stands, [b - a for a, b in run.spans])
-    return made
-
-
-def standing(log: Experiment, role: str, made: Array, gain: float, note: str) -> Experiment:
-    """The experiment with where its actuator stood: by the signal ``role``, which answers a constant with
-    ``gain`` and is ``made`` (n,) from 0 on, while neither has moved beyond the noise."""
+def standing(rig: Rig, log: Experiment, placed: Sequence[Placed], note: str) -> Experiment:
+    """The experiment with where its actuator stood, and a ``note`` where that was not at 0: by the first
+    signal behind it, while neither that nor what the rig with what is ``placed`` makes from 0 on has moved
+    beyond the noise."""
+    entry = "command" if "command" in log else "pressure"
+    role, last = ("curvature", "actuator") if "curvature" in log else ("output", "sensor")
+    gain = 1.0 if role == "curvature" else rig.sensor.dc_gain
+    if entry not in log or role not in log or len(log) < 2 * _FIRST or not _alone(rig):
+        return log
+    run, chain = Run.of([len(log)], [log.start], log.sample_time), Chain(rig, tuple(placed))
+    made = chain.run(np.asarray(log[entry], float), ENTERS[entry], last, run, between_of(rig, entry))
     off = np.asarray(log[role], float) - made
     white = white_level(off)
     still = max(min(_moves(made, white), _moves(off, white)), _FIRST)
     place = float(np.median(off[:still]))
-    if abs(place) <= _APART * white / np.sqrt(still):
+    if not abs(place) > _APART * white / np.sqrt(still):
         return replace(log, stands=0.0)
     begins = {"curvature": Begin((place / gain,))} if "curvature" in log else {}
     notes = (*(n for n in log.notes if n != note), note)
     return replace(log, stands=place / gain, begins={**log.begins, **begins}, notes=notes)
+
+
+def _alone(rig: Rig) -> bool:
+    """Whether regulator and sensor come to rest at a level."""
+    return bool(np.isfinite(rig.regulator.dc_gain) and np.isfinite(rig.sensor.dc_gain))
 
 
 def _moves(signal: Array, noise: float) -> int:

@@ -47,6 +47,7 @@ CONSTANTS = {
     "verdict/evidence.py": ["_STILL"],
     "verdict/moves.py": ["_SLACK"],
     "verdict/outside.py": ["_ASKED", "_BAND"],
+    "verdict/restless.py": ["_MOVES", "_RESTS", "_STILL", "_SURE"],
     "verdict/pieces.py": ["_PARTS"],
     "verdict/improvement.py": [
         "_AHEAD",

@@ -1,7 +1,8 @@
 """Axes and masses with dry friction, made by an integrator of LuGre's bristles, which is no form of the
 library.
 
-Red when friction on an axis is missed or called another name, or a sound axis is called faulty.
+Red when friction on an axis is missed or called another name, or a sound axis is called faulty, be it that
+each of its logs begins where the last one left it.
 """
 
 import os
@@ -155,3 +156,43 @@ def test_public_records(name, effect, train, test, tmp_path):
     row = measured(benchmark, DATA, tmp_path)
     assert row[1].split("`")[1] == effect and (name == "EMPS" or row[1].startswith("named"))
     assert float(row[3].split()[0]) < train and float(row[4].split()[0]) < test
+
+
+RACK = replace(
+    AXIS,
+    regulator=TransferFunction([(2.0, 0.0)], [(0.05, 1.0), (1.0, 0.0)]),
+    sensor=TransferFunction([(1.0, 0.0)], [(0.06, 1.0), (1.0, 0.0)]),
+)
+
+
+def driven(place, seed, n=1200):
+    """A log of an axis on a rack, from where it stood, by small steps."""
+    rng, sub = np.random.default_rng(seed), 20
+    u = np.repeat(rng.uniform(-0.5, 0.5, n // 60), 60) * (H * np.arange(n) > 1.0)
+    p = v = 0.0
+    y = read = place
+    columns = {"command": u, "pressure": np.empty(n), "output": np.empty(n)}
+    for i in range(n):
+        columns["pressure"][i], columns["output"][i] = p, read
+        for _ in range(sub):
+            p += H / sub / 0.05 * (2.0 * u[i] - p)
+            v += H / sub / 0.45 * (p - 0.9 * v)
+            y += H / sub * v
+            read += H / sub / 0.06 * (y - read)
+    for role, size in (("pressure", 0.008), ("output", 0.01)):
+        columns[role] = columns[role] + size * rng.standard_normal(n)
+    return Experiment(f"log{seed}", H, columns, start=40.0 * seed)
+
+
+def test_an_axis_begins_where_it_was_left():
+    """The places alone are a drift of the sensor, or its noise, to a model that begins each log at 0."""
+    found = diagnose(RACK, [driven(place, k) for k, place in enumerate((0.0, 1.5, 4.0, 6.5))], pictures=False)
+    assert found.verdict in ("none", "parameters") and found.gap.refitted < 3.0 * found.gap.floor
+    assert any("begins away from rest" in note for note in found.notes)
+
+
+def test_replay_begins_where_an_axis_was_left():
+    told = replay(RACK, [driven(2.0, 1)])
+    assert told.logs["log1"].rmse < 0.05 and told.simulated["log1"]["output"][0] == pytest.approx(
+        2.0, abs=0.02
+    )

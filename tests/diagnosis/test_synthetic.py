@@ -201,6 +201,9 @@ def test_what_brings_the_whole_output_no_closer_is_not_named():
     assert summary._no_closer(RIG, logs, rigs, explanations) == []
     worse = replace(rigs, placed=(turned,))
     assert summary._no_closer(RIG, logs, worse, explanations) == [explanations[-1]]
+    # but it is there: without it the output is off by far more than noise
+    sorted_out = [summary.sorted_out(RIG, logs, of, explanations, False) for of in (rigs, worse)]
+    assert [s.unknown for s in sorted_out] == [[], [explanations[-1]]]
 
 
 def test_noise_that_stays_in_an_input_is_known_behind_a_stage_that_hums(monkeypatch):

@@ -28,7 +28,7 @@ def is_restless(e: Explanation) -> bool:
     that add up, or go round in a loop, are left where they come about by neither."""
     if e.segment.closed or e.segment.pace or e.segment.withheld or e.converter is not None:
         return False
-    return not is_rounded(e.causes) and louder(e) > NUMBERS.restless
+    return not is_rounded(e.causes) and louder(e) > NUMBERS.loudest
 
 
 @lru_cache(maxsize=16)
@@ -52,11 +52,9 @@ def louder(e: Explanation) -> float:
         return 1.0
     # in logarithms, for a few stretches may be far louder than the others
     logs = [np.log(np.maximum(s, 1e-300)) for s in (rests, moves)]
-    more, error = (
-        np.mean(logs[1]) - np.mean(logs[0]),
-        np.hypot(*(np.std(s) / np.sqrt(len(s) - 1.0) for s in logs)),
-    )
-    return float(np.mean(moves) / max(np.mean(rests), 1e-300)) if more > _SURE * error else 1.0
+    more = float(np.mean(logs[1]) - np.mean(logs[0]))
+    error = float(np.hypot(*(np.std(s) / np.sqrt(len(s) - 1.0) for s in logs)))
+    return float(np.mean(moves)) / max(float(np.mean(rests)), 1e-300) if more > _SURE * error else 1.0
 
 
 def _motion(made: Array, reach: int) -> Array:
