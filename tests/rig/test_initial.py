@@ -13,10 +13,12 @@ import focgen
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.begin import REST, Begin
 from focgen.logs.experiment import Experiment
+from focgen.rig import linear
 from focgen.rig.effects import Run, form_of, library
 from focgen.rig.engine import Chain, Placed, slot_in
 from focgen.rig.initial import NOTE, begun
 from focgen.rig.rig import Actuator, Delays, LinearActuator, Rig, Signals
+from focgen.rig.session import run_of
 from tests.diagnosis_rig import RIG, H, session
 
 N = 400
@@ -277,10 +279,29 @@ def test_an_offset_behind_an_input_that_passes_through_zero_is_no_past():
     assert begun(rig, [Experiment("sine", H, {"pressure": p, "output": y})])[0].begins == {}
 
 
-def test_a_rig_that_integrates_is_left_alone():
-    rig = replace(RIG, actuator=LinearActuator(TransferFunction([(1.0, 0.0)], [(1.0, 1.0)])))
-    logs = [cut(session(seed=1)[0], 10.0)]
-    assert begun(rig, logs)[0].begins == {}
+@pytest.mark.parametrize("place, told", [(0.0, 0.0), (0.002, 0.0), (3.0, 3.0), (-40.0, -40.0)])
+@pytest.mark.parametrize("curvature", [True, False], ids=["its place logged", "the output alone"])
+def test_of_a_rig_that_integrates_is_told_where_it_stood(place, told, curvature):
+    """No past of its input tells that; its sensor, of gain 2, is at rest there. A little is noise."""
+    sensor = TransferFunction([(2.0, 0.0)], [(0.1, 1.0), (1.0, 0.0)])
+    axis = LinearActuator(TransferFunction([(1.0, 0.0)], [(1.0, 1.0)]))
+    rig, rng, n = Rig("axis", H, RIG.signals, axis, sensor=sensor), np.random.default_rng(4), 400
+    u = np.repeat([0.0, 0.6, -0.3, 0.2], n // 4)
+    y = place + H * np.cumsum(np.r_[0.0, (u[1:] + u[:-1]) / 2])
+    seen = linear.run(sensor, y - place, Run.of([n], [0.0], H).rest, H, n * H) + 2.0 * place
+    noisy = {
+        "pressure": u,
+        "curvature": y + 0.02 * rng.normal(size=n),
+        "output": seen + 0.02 * rng.normal(size=n),
+    }
+    if not curvature:
+        del noisy["curvature"]
+    (log,) = begun(rig, [Experiment("move", H, noisy)])
+    assert log.stands == pytest.approx(told, abs=0.02) and (NOTE in log.notes) == bool(told)
+    assert ("curvature" in log.begins) == (curvature and bool(told))
+    run = run_of([log], "pressure")
+    made = Chain(rig).run(u, "actuator", "sensor", run)
+    np.testing.assert_allclose(made, seen, atol=0.05)
 
 
 def test_a_window_of_a_log_forgets_the_begin_of_the_whole():
