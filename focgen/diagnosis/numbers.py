@@ -228,9 +228,10 @@ class Numbers:
     )
     smaller: float = _number(
         0.9,
-        "how sure a cause beside a larger one of its segment may be, of what it would be alone",
+        "how sure a cause beside a larger one of its segment may be, of what it would be alone; "
+        "or beside a number moved by more than three times its uncertainty",
         "of the confidence",
-        "50 such causes of rigs not seen before: 48 right",
+        "50 causes of the former kind on rigs not seen before: 48 right; 14 of the latter: 12",
         "not measured",
         "–",
     )

@@ -15,7 +15,7 @@ from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.factors import factors
 from focgen.diagnosis.problem.nominal_parameters import NominalParameters
 from focgen.diagnosis.problem.segments import make
-from focgen.diagnosis.verdict import compose
+from focgen.diagnosis.verdict import compose, conclude
 from focgen.diagnosis.verdict.moves import far_moves
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig.replay import simulate_session
@@ -185,6 +185,23 @@ def test_the_note_of_a_factor_is_the_factor():
     (gain, time) = far_moves(rig, own.put(rig, np.log([1.25, 0.4])))
     assert "regulator's gain by +25 %" in gain and "regulator's times by -60 %" in time
     assert far_moves(rig, own.put(rig, np.log([1.05, 0.8]))) == ()
+
+
+def test_beside_a_number_that_was_moved_far_no_name_is_sure(monkeypatch):
+    """Either that number or the name is wrong; what is taken for granted is there all the same."""
+    logs, line = session(11, vent=0.5), "the refit moves the sensor's gain"
+
+    def confidence(**how):
+        found = diagnose(RIG, logs, pictures=False, **how)
+        (first, *_) = (c for cause in found.causes for c in cause.candidates)
+        return first.confidence, line in found.notes
+
+    sure, said = confidence(only=["valve_asymmetry"])
+    assert sure > 0.9 and not said
+    monkeypatch.setattr(conclude, "far_moves", lambda given, refitted: (line,))
+    assert confidence(only=["valve_asymmetry"]) == (sure, True)
+    unsure, said = confidence()
+    assert unsure <= 0.9 * 0.96 and said
 
 
 @pytest.mark.parametrize(

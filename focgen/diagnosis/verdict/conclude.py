@@ -60,7 +60,9 @@ def conclude(
     stands = sorted_out(rig, logs, rigs, explanations, granted)
     summary, unknown = stands.summary, stands.unknown
     made, squares, floor, total = summary.made, summary.squares, summary.floor, summary.total
-    found = _ordered([_found(e, c, summary, logs) for e, c in summary.causes])
+    far = far_moves(rig, summary.rigs.fitted if summary.causes else summary.rigs.refitted)
+    trust = NUMBERS.smaller if far and not granted else 1.0
+    found = _ordered([_found(e, c, summary, logs, trust) for e, c in summary.causes])
     found += _departures(controller)
     word = _word(found, unknown, [e for e in explanations if e.kept_by(rig, summary.rigs.refitted)])
     if controller is not None and controller.large and not found:
@@ -79,7 +81,7 @@ def conclude(
         unexplained=_description(unknown) | _departing(controller),
         notes=(
             *notes_of(logs),
-            *far_moves(rig, summary.rigs.fitted if summary.causes else summary.rigs.refitted),
+            *far,
             *cautions(summary.causes, unknown, list(doubted), [*off, *nominal_alone(explanations, off)]),
             *lesser(stands.beside),
             *the_rest(summary),
@@ -151,12 +153,14 @@ def _found(
     cause: Cause,
     summary: Summary,
     logs: Sequence[Experiment],
+    trust: float,
 ) -> Found:
+    """A cause as an entry of the diagnosis, no surer than the file's own numbers can be trusted."""
     rigs = summary.rigs
     kept, sure = tied(cause.rivals)
     sure = sure * NUMBERS.unlikely if e.freed else sure  # numbers far off explain the same
     sure = sure * NUMBERS.unlikely if summary.stands_for_more or acts_besides(e) else sure
-    sure = sure * _lasting(e, cause) * _beside(e, cause)
+    sure = sure * _lasting(e, cause) * min(_beside(e, cause), trust)
     total = summary.total or Improvement(0.0, (0.0, 0.0))
     lost = _share_lost(cause, rigs, logs, summary.squares, summary.floor, total)
     candidates = tuple(_candidate(r, float(p), rigs.fitted) for r, p in zip(kept, sure))
