@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -41,6 +41,7 @@ class Segment:
     longer counts, of a rig that integrates; 0: none is forgotten. ``whole``: where a logger filled rows in,
     the segment at every row, at which its input comes; the one itself has the ``readings`` (n,) of it alone.
     ``band``: by how much the output has to change to be logged, in its unit, 0 where all of it is.
+    ``passed``: by role, logged signals (n,) that the output may take up at once, of order one.
     """
 
     entry: str
@@ -63,6 +64,7 @@ class Segment:
     whole: Segment | None = None
     readings: Ints | None = None
     band: float = 0.0
+    passed: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @property
     def fed(self) -> Segment:
@@ -87,7 +89,8 @@ class Segment:
         )
         read = replace(self, x=x, y=y, trust=trust, asked=asked, input_modes=modes, loose=loose, run=seldom)
         wanted = self.wanted[rows] if len(self.wanted) else self.wanted
-        return replace(read, wanted=wanted, whole=self, readings=rows)
+        passed = {role: values[rows] for role, values in self.passed.items()}
+        return replace(read, wanted=wanted, passed=passed, whole=self, readings=rows)
 
     @cached_property
     def level_in(self) -> float:
@@ -220,9 +223,19 @@ def make(
         np.zeros((len(x), 0)),
         wanted=_asked(logs, x, closed) if any(closed) else np.zeros(0),
         band=dead_band(y),
+        passed=_passed(logs, entry, exit),
     )
     rows = _readings(logs, exit)
     return whole if rows is None else whole.read_at(rows)
+
+
+def _passed(logs: Sequence[Experiment], entry: str, exit: str) -> dict[str, np.ndarray]:
+    """By role the logged signals (n,) ahead of the output, of order one: its own input only where more than
+    one stage lies between, for one stage alone answers at once as it may."""
+    last = _ORDER.index(entry) + (len(between(entry, exit)) > 1)
+    roles = [role for role in _ORDER[:last] if all(role in log for log in logs)]
+    signals = {role: joined(logs, role) for role in roles}
+    return {role: x / (float(np.max(np.abs(x))) or 1.0) for role, x in signals.items()}
 
 
 def _readings(logs: Sequence[Experiment], role: str) -> Ints | None:

@@ -21,6 +21,7 @@ from focgen.diagnosis.verdict.instead import Instead, sound_part
 from focgen.diagnosis.verdict.late import logged_late
 from focgen.diagnosis.verdict.moments import changed_at_once
 from focgen.diagnosis.verdict.predicted_improvement import paths, promised
+from focgen.diagnosis.verdict.taken_up import taken_up
 from focgen.diagnosis.verdict.uneven import unevenly_paced
 from focgen.diagnosis.verdict.unexplained import is_unknown
 from focgen.logs.experiment import Experiment
@@ -137,7 +138,7 @@ def _summary(
 
 def doubts(e: Explanation) -> tuple[Instead | None, ...]:
     """What no effect is, and may be there instead of what was found."""
-    return changed_at_once(e), logged_late(e), clocks_apart(e), unevenly_paced(e)
+    return changed_at_once(e), logged_late(e), clocks_apart(e), unevenly_paced(e), taken_up(e)
 
 
 def sound_parts(explanations: Sequence[Explanation]) -> dict[Explanation, Explanation]:

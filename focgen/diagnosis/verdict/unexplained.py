@@ -14,6 +14,7 @@ from focgen.diagnosis.verdict.late import is_late
 from focgen.diagnosis.verdict.moments import another
 from focgen.diagnosis.verdict.outside import from_outside
 from focgen.diagnosis.verdict.restless import is_restless
+from focgen.diagnosis.verdict.taken_up import is_taken_up
 from focgen.diagnosis.verdict.uneven import is_uneven
 from focgen.rig.effects import library
 
@@ -35,7 +36,7 @@ def is_unknown(e: Explanation) -> bool:
     if (
         e.causes
         and not is_rounded(e.causes)
-        and (from_outside(e) or another(e) or is_late(e) or are_apart(e) or is_uneven(e))
+        and (from_outside(e) or another(e) or is_late(e) or are_apart(e) or is_uneven(e) or is_taken_up(e))
     ):
         return True
     if e.predictability.share < NUMBERS.left:
