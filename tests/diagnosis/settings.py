@@ -48,6 +48,7 @@ CONSTANTS = {
     "verdict/moves.py": ["_SLACK"],
     "verdict/outside.py": ["_ASKED", "_BAND"],
     "verdict/restless.py": ["_MOVES", "_RESTS", "_STILL", "_SURE"],
+    "verdict/taken_up.py": ["_SETTLED"],
     "verdict/pieces.py": ["_PARTS"],
     "verdict/improvement.py": [
         "_AHEAD",

@@ -12,7 +12,7 @@ from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.verdict import instead, summary
 from focgen.diagnosis.verdict.instead import Instead, sound_part
 
-DOUBTS = ("changed_at_once", "logged_late", "clocks_apart", "unevenly_paced")
+DOUBTS = ("changed_at_once", "logged_late", "clocks_apart", "unevenly_paced", "taken_up")
 
 
 def explained(monkeypatch, *families):

@@ -42,9 +42,9 @@ class TakenUp(Instead):
 
 @lru_cache(maxsize=16)
 def taken_up(e: Explanation) -> TakenUp | None:
-    """How likely the output takes up a signal at once, instead of an effect found; None where nothing was
-    found, where errors add up, or where a rounding was found."""
-    if e.segment.pace or not e.best.problem.families:
+    """How likely the output takes up a signal at once, instead of an effect found or of none, though inputs
+    predict much; None where they do not, where errors add up, or where a rounding was found."""
+    if e.segment.pace or not (e.best.problem.families or e.predictability.share > NUMBERS.left):
         return None
     return likeliest(e, _judged)
 
