@@ -52,7 +52,7 @@ def test_a_few_modes_follow_s_to_the_alpha_over_four_decades():
             assert above(memory) <= memory.certificate.above <= 2.0
 
 
-@pytest.mark.parametrize("order", [0.1, 1.1, 1.9, -0.5])
+@pytest.mark.parametrize("order", [*(pytest.param(a, marks=pytest.mark.long) for a in (0.1, 1.1)), 1.9, -0.5])
 def test_other_orders_are_within_a_factor_of_five(order):
     memory = fit_band_states(order, LOW, HIGH, 9)
     with mp.workdps(40):

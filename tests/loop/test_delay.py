@@ -182,7 +182,9 @@ def test_side_bands_of_a_slow_roll_off_are_all_there():
             assert abs(found / exact - 1.0) < 2e-4
 
 
-@pytest.mark.parametrize("delays", STAGES)
+@pytest.mark.parametrize(
+    "delays", [*(pytest.param(one, marks=pytest.mark.long) for one in STAGES[:2]), *STAGES[2:]]
+)
 def test_a_delayed_rig_moves_as_one_with_the_delay_as_an_effect(delays):
     """The effect is replayed between the samples and solved for in the loop: another way to the same."""
     rig, controller = paper_rig(), paper_controller(100)
