@@ -25,6 +25,7 @@ from focgen.logs.experiment import Experiment
 from tests.conftest import paper_rig
 
 K, T, ALPHA, LEVEL = 0.05, 1.32, 0.6, 0.15
+COARSE = 0.05  # s between samples, where many fits are asked for
 
 
 @cache
@@ -124,11 +125,11 @@ def test_between_samples_a_smooth_input_is_met_to_the_sixth_order():
 
 def coverage(colour: float, seeds: int) -> float:
     """Share of the 95 % intervals of K, T and α that contain the truth; noise of 2 % of the final value."""
-    clean, hits = step_log(), 0
+    count, hits = len(step_log(COARSE)), 0
     for seed in range(seeds):
-        white = np.random.default_rng(seed).normal(size=len(clean) + 200)
+        white = np.random.default_rng(seed).normal(size=count + 200)
         noise = lfilter([np.sqrt(1.0 - colour**2)], [1.0, -colour], white)[200:]
-        fit = fitted(step_log(noise=0.02 * K * LEVEL * noise))
+        fit = fitted(step_log(COARSE, noise=0.02 * K * LEVEL * noise))
         hits += abs(fit.K - K) <= fit.half["gain"][0]
         hits += (abs(fit.T - T) <= fit.half["T"]) + (abs(fit.alpha - ALPHA) <= fit.half["alpha"])
     return hits / (3 * seeds)
