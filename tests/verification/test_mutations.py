@@ -240,8 +240,14 @@ def test_a_fault_in_the_c_shows_in_the_samples(sound, tmp_path, name, arithmetic
     assert found.differences == (f"{changed}: is not what focgen writes for this controller.toml",)
 
 
-@pytest.mark.parametrize("arithmetic", ARITHMETICS)
-@pytest.mark.parametrize("place", (0, 20, 40))
+@pytest.mark.parametrize(
+    "place, arithmetic",
+    [
+        pytest.param(place, arithmetic, marks=() if i == j else pytest.mark.long)
+        for i, place in enumerate((0, 20, 40))
+        for j, arithmetic in enumerate(ARITHMETICS)
+    ],
+)
 def test_one_weight_wrong_by_its_last_digit(sound, tmp_path, arithmetic, place):
     """The least change of a weight that the text can hold."""
     folder = copied(sound, tmp_path, "spba", arithmetic)
@@ -269,8 +275,14 @@ def neighbour(text: str) -> str:
     return f"{np.nextafter(value, np.copysign(np.float32(np.inf), value)):.9g}f"
 
 
-@pytest.mark.parametrize("arithmetic", ("q31", "f32"))
-@pytest.mark.parametrize("macro", ("REF_LSB", "U_LSB", "SCHED_LSB", "SAMPLE_TIME"))
+@pytest.mark.parametrize(
+    "macro, arithmetic",
+    [
+        pytest.param(macro, arithmetic, marks=() if i % 2 == j else pytest.mark.long)
+        for i, macro in enumerate(("REF_LSB", "U_LSB", "SCHED_LSB", "SAMPLE_TIME"))
+        for j, arithmetic in enumerate(("q31", "f32"))
+    ],
+)
 def test_a_scale_of_the_header(sound, tmp_path, arithmetic, macro, capsys):
     """No sample depends on it, and every program that uses the controller does."""
     folder = copied(sound, tmp_path, "spba", arithmetic)
