@@ -79,7 +79,7 @@ def everything(tmp_path_factory) -> tuple[Path, list[str]]:
     return folder, names
 
 
-@pytest.mark.parametrize("level", ["-O0", "-O2"])
+@pytest.mark.parametrize("level", [pytest.param("-O0", marks=pytest.mark.long), "-O2"])
 def test_sound_boards_agree(level, everything):
     """Every kind of controller, all in one program; not a warning."""
     folder, names = everything

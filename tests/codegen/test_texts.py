@@ -50,8 +50,14 @@ def controller_named(text: str, **changes):
     return paper_controller(12, name=text, units=Units(text, text, text), **changes)
 
 
-@pytest.mark.parametrize("what", HOSTILE)
-@pytest.mark.parametrize("arithmetic", ("q31", "f32"))
+@pytest.mark.parametrize(
+    "what, arithmetic",
+    [
+        pytest.param(what, arithmetic, marks=() if i == turn % 2 else pytest.mark.long)
+        for turn, what in enumerate(HOSTILE)
+        for i, arithmetic in enumerate(("q31", "f32"))
+    ],
+)
 def test_hostile_text_compiles_and_is_printed(tmp_path, what, arithmetic):
     text = HOSTILE[what]
     generate(controller_named(text), tmp_path, arithmetic, name="loop", selftest=True)

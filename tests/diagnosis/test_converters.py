@@ -124,7 +124,7 @@ def test_levels_of_a_finer_converter_behind_are_steps(monkeypatch):
     assert [c.candidates[0].effect for c in found.causes] == ["sensor_quantization"]
 
 
-@pytest.mark.parametrize("noise, seed", [(0.6, 5), (0.6, 6), (0.1, 5)])
+@pytest.mark.parametrize("noise, seed", [(0.6, 5), pytest.param(0.6, 6, marks=pytest.mark.long), (0.1, 5)])
 def test_steps_are_a_cause_where_they_make_most_of_the_noise(noise, seed):
     """Every converter has steps. Readings of a healthy rig whose noise is 0.6 of a step were named coarse at
     96 %, and 0 % of the gap."""
@@ -205,7 +205,7 @@ def rubbed(force: np.ndarray, rub: float) -> np.ndarray:
     return np.array(found)
 
 
-@pytest.mark.parametrize("seed", [3, 4])
+@pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.long)])
 def test_steps_that_are_noise_hide_no_friction(seed):
     """The friction moves the reading by half a step, of twice the noise. It was seen, and was unknown."""
     rng, step = np.random.default_rng(seed), 0.1

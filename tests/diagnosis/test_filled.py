@@ -76,7 +76,7 @@ def test_a_log_at_rest_beside_slow_ones_is_read(tmp_path):
     logs = logged(session(4, slip=0.6), every(8, held))
     still = {role: np.zeros(60) for role in logs[0].signals}
     rest = replace(logs[-1], name="rest", signals=still, start=logs[-1].start + 60.0)
-    found = diagnose(RIG, [*logs, rest], out=tmp_path / "gap")
+    found = diagnose(RIG, [*logs, rest], out=tmp_path / "gap", pictures=False)
     assert [c.candidates[0].effect for c in found.causes] == ["hysteresis"]
 
 

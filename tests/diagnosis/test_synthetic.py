@@ -25,18 +25,25 @@ from focgen.rig.rig import UNITY
 from tests.diagnosis_rig import RIG, H, session
 
 
+@pytest.fixture(scope="module")
+def drifting(tmp_path_factory):
+    """What is said of a gain that drifts, and the folder that it is written into."""
+    folder = tmp_path_factory.mktemp("drifting")
+    return diagnose(RIG, session(11, drift=6e-4), folder, pictures=False), folder
+
+
 def named(diagnosis):
     return [[c.effect for c in f.candidates] for f in diagnosis.causes]
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(s, marks=pytest.mark.long) for s in (1, 2))])
 def test_no_gap(seed):
     found = diagnose(RIG, session(seed))
     assert found.verdict in ("none", "parameters") and not found.causes
     assert found.shrink is None and found.where.stage is None
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_parameters_only(seed):
     found = diagnose(RIG, session(seed, T=1.6, alpha=0.55, gain=(0.0025, 0.3)))
     assert found.verdict == "parameters"
@@ -50,12 +57,19 @@ def test_parameters_only(seed):
         ("valve_asymmetry", "regulator", {"vent": 0.8}),
         ("dead_zone", "actuator", {"zone": 0.045}),
         ("hysteresis", "actuator", {"slip": 0.35}),
-        ("gain_drift", "actuator", {"drift": 6e-4}),
         ("sensor_nonlinearity", "sensor", {"bend": 20.0}),
     ],
 )
 def test_one_effect_is_named_in_its_stage(effect, stage, case):
-    found = diagnose(RIG, session(11, **case))
+    is_named(diagnose(RIG, session(11, **case)), effect, stage)
+
+
+def test_a_drift_is_named_in_its_stage(drifting):
+    is_named(drifting[0], "gain_drift", "actuator")
+
+
+def is_named(found, effect, stage):
+    """Alone, and as most of the gap."""
     assert found.verdict == "named" and named(found) == [[effect]]
     assert found.where.stage == stage and not found.where.inferred
     assert found.gap.explained < found.gap.refitted <= found.gap.as_given * 1.02
@@ -69,7 +83,7 @@ def test_a_gain_that_ends_is_seen_though_own_parameters_bend_to_make_up_for_it()
     assert found.verdict == "named" and named(found) == [["gain_nonlinearity"]]
 
 
-@pytest.mark.parametrize("camera", [5.0, 12.0])
+@pytest.mark.parametrize("camera", [12.0, pytest.param(5.0, marks=pytest.mark.long)])
 def test_a_noisy_camera_makes_no_fault_of_the_sensor_behind_it(camera):
     """What the actuator's refit leaves open of the curvature is no effect of the sensor that reads it."""
     found = explain_all(RIG, session(1, camera=camera, noise=0.003), NUMBERS.nats)
@@ -105,7 +119,7 @@ def test_a_fault_of_the_sensor_behind_a_noisy_camera_is_found():
 
 
 @pytest.mark.parametrize("role", ["pressure", "curvature"])
-@pytest.mark.parametrize("off", [0.008, 0.03])
+@pytest.mark.parametrize("off", [0.03, pytest.param(0.008, marks=pytest.mark.long)])
 def test_gauges_that_disagree_by_a_little_are_no_fault(role, off):
     logs = [replace(log, signals={**log.signals, role: log[role] * (1 + off)}) for log in session(1, T=1.45)]
     found = diagnose(RIG, logs)
@@ -122,7 +136,7 @@ def test_gauges_of_a_stage_that_is_absent_agree_to_a_percent(off, fault):
 
 
 def test_the_promise_holds_on_new_experiments(tmp_path):
-    found = diagnose(RIG, session(3, slip=0.35)[:4], tmp_path / "out")
+    found = diagnose(RIG, session(3, slip=0.35)[:4], tmp_path / "out", pictures=False)
     unseen = session(3, slip=0.35)[4:]
     floor = session(3, slip=0.35, noise=0.0)[4:]
     noise = np.mean((unseen[0]["output"] - floor[0]["output"]) ** 2)
@@ -346,8 +360,8 @@ def test_told_two_effects_it_takes_the_small_one_too():
     assert told.best.sse < blind.best.sse
 
 
-def test_the_plain_fits_rank_the_true_effect_first():
-    found = diagnose(RIG, session(11, drift=6e-4))
+def test_the_plain_fits_rank_the_true_effect_first(drifting):
+    found = drifting[0]
     assert found.fits[0].effect == "gain_drift" and found.fits[0].error < 0.7
     assert [f.error for f in found.fits] == sorted(f.error for f in found.fits)
 
@@ -374,9 +388,8 @@ def test_units_do_not_matter():
     assert named(diagnose(rig, scaled)) == [["dead_zone"]]
 
 
-def test_session_state_carries_on(tmp_path):
-    diagnose(RIG, session(11, drift=6e-4), tmp_path)
-    rig = read_rig(tmp_path / "augmented.toml")
+def test_session_state_carries_on(drifting):
+    rig = read_rig(drifting[1] / "augmented.toml")
     assert [e["name"] for e in rig.effects] == ["gain_drift"]
     assert rig.effects[0]["clock"] > 300
 

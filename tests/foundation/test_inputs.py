@@ -103,7 +103,7 @@ def test_a_picture_does_not_replace_an_input(files, command, tmp_path, capsys, m
     monkeypatch.setattr(focgen.cli.simulate, "simulation_pictures", lambda *a: pictures)
     out = tmp_path / "new.toml"
     asked = {
-        "identify": ["identify", files["steps.csv"], "--rig", rig, "--out", out, "--to", "40"],
+        "identify": ["identify", files["steps.csv"], "--rig", rig, "--out", out, "--to", "8", "--no-integer"],
         "design": ["design", rig, "--out", out],
         "simulate": ["simulate", rig, files["controller.toml"], "--setpoints", "0.005"],
     }

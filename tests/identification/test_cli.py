@@ -146,7 +146,7 @@ def test_releases_move_the_parameters_off(tmp_path, capsys):
     """The maker's actuator unloads at 0.4 times its speed: one T cannot be true of both, and the fit says
     worse.
     """
-    argv = ["identify", str(STEPS), "--rig", str(RIG), "--out", str(tmp_path / "new.toml")]
+    argv = ["identify", str(STEPS), "--rig", str(RIG), "--out", str(tmp_path / "new.toml"), "--no-integer"]
     assert main(argv) == 0
     text = capsys.readouterr().out
     assert "FOM" in text and "K(p) = " in text and "positive steps only" not in text
@@ -208,7 +208,7 @@ def test_sines_determine_the_model_as_well(tmp_path, capsys):
 )
 def test_where_one_cannot_be_written_neither_is(tmp_path, capsys, out, report):
     (tmp_path / "file").write_text("in the way")
-    argv = ["identify", str(STEPS), "--rig", str(RIG), "--to", "8"]
+    argv = ["identify", str(STEPS), "--rig", str(RIG), "--to", "8", "--no-integer"]
     assert main([*argv, "--out", str(tmp_path / out), "--report", str(tmp_path / report)]) == 2
     assert "file" in capsys.readouterr().err
     assert [p.name for p in tmp_path.iterdir()] == ["file"]

@@ -41,8 +41,16 @@ def trials(course, delay: float, seeds: range):
     return np.array(errors), np.array(halves)
 
 
-@pytest.mark.parametrize("course", [held, slow])
-@pytest.mark.parametrize("delay", [0.0, 2.37 * STEP, 0.15])
+@pytest.mark.parametrize(
+    "course, delay",
+    [
+        *((held, 2.37 * STEP), (slow, 0.0), (slow, 0.15)),
+        *(
+            pytest.param(*case, marks=pytest.mark.long)
+            for case in ((slow, 2.37 * STEP), (held, 0.0), (held, 0.15))
+        ),
+    ],
+)
 def test_the_dead_time_lies_in_its_interval(course, delay):
     errors, halves = trials(course, delay, range(5))
     assert np.mean(np.abs(errors) <= 1.0) >= 0.7 and np.abs(errors).max() < 2.2

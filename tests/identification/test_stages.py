@@ -106,8 +106,17 @@ def over_seeds(seeds, logs):
 
 
 @cache
+def paper_fit(seed):
+    return identify_stage(regulator_logs(PAPER, commands(seed), seed=seed), "regulator")
+
+
 def paper_fits(seeds):
-    return over_seeds(seeds, lambda seed: regulator_logs(PAPER, commands(seed), seed=seed))
+    return [paper_fit(seed) for seed in range(seeds)]
+
+
+@cache
+def sensor_fit(seed):
+    return identify_stage(sensor_logs(([10.0], [1.0, 10.0]), seed=seed), "sensor")
 
 
 # the regulator of the paper
@@ -263,7 +272,7 @@ def test_long_logs_are_fitted_to_the_last_sample():
 
 
 def test_the_papers_sensor_behind_a_noisy_camera():
-    fit = identify_stage(sensor_logs(([10.0], [1.0, 10.0])), "sensor")
+    fit = sensor_fit(0)
     assert (fit.shape, fit.delay) == ("1p", 0.0)
     assert covers(fit, "T", 0.1) and covers(fit, "gain", 1.0)
     assert fit.parameters["T"][1] < 0.004 and fit.gain_relative < 0.005
@@ -271,7 +280,7 @@ def test_the_papers_sensor_behind_a_noisy_camera():
 
 
 def test_noise_on_the_sensors_input_does_not_bias_it():
-    fits = [identify_stage(sensor_logs(([10.0], [1.0, 10.0]), seed=s), "sensor") for s in range(4)]
+    fits = [sensor_fit(seed) for seed in range(4)]
     gains, times = (np.array([f.parameters[name][0] for f in fits]) for name in ("gain", "T"))
     assert abs(gains.mean() - 1.0) < 0.001
     assert abs(times.mean() - 0.1) < 0.001

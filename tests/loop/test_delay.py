@@ -96,8 +96,14 @@ def test_a_delay_of_nothing_is_the_frozen_step_without():
 # --------------------------------------------------------------------------------------------- sampled loops
 
 
-@pytest.mark.parametrize("delay", [0, 1])
-@pytest.mark.parametrize("delays", STAGES)
+@pytest.mark.parametrize(
+    "delays, delay",
+    [
+        pytest.param(delays, delay, marks=() if delay == turn % 2 else pytest.mark.long)
+        for turn, delays in enumerate(STAGES)
+        for delay in (0, 1)
+    ],
+)
 def test_the_sampled_loop_ends_where_its_difference_equation_does(delays, delay):
     """y_k = u_(k−n−1), u by the trapezoidal rule: the phase is −90° − (n + 1 + delay) ωh at every frequency,
     so the limit is 2 tan(ωh/2)/h at ωh = π/2/(n + 1 + delay)."""
@@ -182,7 +188,9 @@ def test_side_bands_of_a_slow_roll_off_are_all_there():
             assert abs(found / exact - 1.0) < 2e-4
 
 
-@pytest.mark.parametrize("delays", STAGES)
+@pytest.mark.parametrize(
+    "delays", [*(pytest.param(one, marks=pytest.mark.long) for one in STAGES[:2]), *STAGES[2:]]
+)
 def test_a_delayed_rig_moves_as_one_with_the_delay_as_an_effect(delays):
     """The effect is replayed between the samples and solved for in the loop: another way to the same."""
     rig, controller = paper_rig(), paper_controller(100)

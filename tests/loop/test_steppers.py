@@ -61,8 +61,14 @@ def cases(arithmetic, count, **memory):
         yield np.random.default_rng(seed), controller, plan
 
 
-@pytest.mark.parametrize("memory", [{}, EXPONENTIAL], ids=["short", "exponential"])
-@pytest.mark.parametrize("arithmetic", ["f64", "f32", "q31", "q15"])
+@pytest.mark.parametrize(
+    "memory, arithmetic",
+    [
+        pytest.param(memory, arithmetic, marks=() if (i + j // 2) % 2 == 0 else pytest.mark.long)
+        for i, memory in enumerate(({}, EXPONENTIAL))
+        for j, arithmetic in enumerate(("f64", "q31", "f32", "q15"))
+    ],
+)
 @pytest.mark.parametrize("count", [10, pytest.param(30, marks=pytest.mark.long)])
 def test_plan_stepper_is_the_bit_true_reference(count, arithmetic, memory):
     """About one controller of each kind here; more in the long suite."""

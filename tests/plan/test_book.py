@@ -69,7 +69,9 @@ def state(plan: Plan, end, machine: Machine, last) -> None:
         assert tuple(map(float, end.applied.gains)) == tuple(map(float, own))
 
 
-@pytest.mark.parametrize("seed", range(18))
+@pytest.mark.parametrize(
+    "seed", [*range(9), *(pytest.param(s, marks=pytest.mark.long) for s in range(9, 18))]
+)
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
 def test_the_reference_does_what_is_written(arithmetic, seed):
     plan = planned(dressed(seed, 12), arithmetic)

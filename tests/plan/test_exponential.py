@@ -33,7 +33,7 @@ RECURSION = simple(
 
 
 @pytest.mark.parametrize(
-    "seed", [*range(16), *(pytest.param(s, marks=pytest.mark.long) for s in range(16, 300))]
+    "seed", [*range(8), *(pytest.param(s, marks=pytest.mark.long) for s in range(8, 300))]
 )
 def test_bounds_hold_for_physical_inputs_anywhere_in_their_ranges(seed):
     """Against the same poles and weights in float64, each mode as a recursion of its own."""

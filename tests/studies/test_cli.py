@@ -22,6 +22,7 @@ from focgen.studies.jobs import Job, answer, read_row
 from focgen.studies.results import Setup, Variant
 from focgen.studies.spectrum import band_of
 from tests.conftest import paper_controller, paper_rig
+from tests.studies.here import answered_here
 
 OPTIONS = [
     "--lengths",
@@ -57,10 +58,9 @@ def folder(tmp_path_factory):
     """A finished study of the paper's controller beside its rig."""
     folder = tmp_path_factory.mktemp("study")
     _made(folder)
-    assert (
-        main(["study", "memory", str(folder / "controller.toml"), "--out", str(folder / "out"), *OPTIONS])
-        == 0
-    )
+    argv = ["study", "memory", str(folder / "controller.toml"), "--out", str(folder / "out"), *OPTIONS]
+    with answered_here():
+        assert main(argv) == 0
     return folder
 
 
@@ -178,7 +178,8 @@ def test_a_rig_that_is_not_the_one_is_not_taken(tmp_path, fault, said):
 def test_without_its_rig_the_open_loop_still_comes(tmp_path):
     _made(tmp_path)
     _lost(tmp_path)
-    found = study.study("memory", tmp_path / "controller.toml", tmp_path / "out", **FEW)
+    with answered_here():
+        found = study.study("memory", tmp_path / "controller.toml", tmp_path / "out", **FEW)
     assert found.rows[0].error > 0.0 and found.rows[0].settling_s is None and found.rig is None
     assert "--rig" in found.notes[0] and not (tmp_path / "out" / "loops.png").exists()
 

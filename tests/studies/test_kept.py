@@ -15,6 +15,7 @@ from focgen.control.files import write_controller
 from focgen.errors import ControllerError, InputError
 from focgen.studies.kept import read_study
 from tests.conftest import paper_controller, paper_rig
+from tests.studies.here import answered_here
 
 SMALL = {"lengths": [5, 20], "memory": ["short"], "arithmetic": ["q15"], "sample_times": [0.01], "jobs": 1}
 
@@ -23,7 +24,8 @@ SMALL = {"lengths": [5, 20], "memory": ["short"], "arithmetic": ["q15"], "sample
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     write_controller(paper_controller(20), folder / "c.toml")
-    focgen.study("memory", folder / "c.toml", folder / "study", rig=paper_rig(), **SMALL)
+    with answered_here(pictures=False):
+        focgen.study("memory", folder / "c.toml", folder / "study", rig=paper_rig(), **SMALL)
     return folder / "study"
 
 
@@ -98,6 +100,6 @@ def test_points_that_are_none_are_a_gap_of_their_curve(folder, tmp_path, part):
 def test_a_study_of_nothing_is_refused(tmp_path):
     """Of two gains a millionth of the range apart no variant has the bits for the slope."""
     steep = replace(paper_controller(20), gain=GainSchedule((0.0, 1e-7), (48.0, 42.0)))
-    with pytest.raises(ControllerError, match="gives nothing to study: 2 rows"):
+    with answered_here(), pytest.raises(ControllerError, match="gives nothing to study: 2 rows"):
         focgen.study("memory", steep, tmp_path / "study", **SMALL)
     assert not (tmp_path / "study" / "study.json").exists()

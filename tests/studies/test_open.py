@@ -85,8 +85,16 @@ def test_the_bias_is_what_a_constant_leaves_after_hours():
     assert found.dc_bias == pytest.approx(constant, rel=1e-9)
 
 
-@pytest.mark.parametrize("memory", ["short", "exponential"])
-@pytest.mark.parametrize("seed", range(12))
+def by_turns(seeds):
+    """Seeds and forms of memory; every other pair is in the long suite."""
+    return [
+        pytest.param(seed, memory, marks=() if (turn // 4 + turn + i) % 2 == 0 else pytest.mark.long)
+        for turn, seed in enumerate(seeds)
+        for i, memory in enumerate(("short", "exponential"))
+    ]
+
+
+@pytest.mark.parametrize("seed, memory", by_turns(range(12)))
 def test_no_error_exceeds_its_bound(seed, memory):
     random = np.random.default_rng(seed)
     order, length = float(random.uniform(0.05, 1.6)), int(random.integers(2, 300))
@@ -106,8 +114,7 @@ def test_no_error_exceeds_its_bound(seed, memory):
     assert 0.0 < found.error <= found.bound
 
 
-@pytest.mark.parametrize("memory", ["short", "exponential"])
-@pytest.mark.parametrize("seed", [1, 4, 19, 31, 35, 44, 51, 59])
+@pytest.mark.parametrize("seed, memory", by_turns([1, 4, 19, 31, 35, 44, 51, 59]))
 def test_any_controller_can_be_studied(seed, memory):
     """Integrating ones, leads, lags, second order; ranges that differ, or hold errors of one sign only."""
     controller = random_controller(seed)

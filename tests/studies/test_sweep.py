@@ -24,6 +24,7 @@ from focgen.studies.jobs import Job
 from focgen.studies.results import Band, Setup, Variant
 from focgen.studies.store import Store
 from tests.conftest import paper_controller, paper_rig
+from tests.studies.here import answered_here
 
 SMALL = dict(
     rig=paper_rig(),
@@ -133,7 +134,8 @@ def test_what_was_edited_is_done_again_and_said(done, alone, tmp_path, counted, 
         kept = json.loads(edited.read_text())
         edit(kept)
         edited.write_text(json.dumps(kept))
-    focgen.study("memory", CONTROLLER, tmp_path / "out", jobs=1, **SMALL)
+    with answered_here():
+        focgen.study("memory", CONTROLLER, tmp_path / "out", jobs=1, **SMALL)
     names = sorted(p.name for p in rows[: len(edits)])
     assert len(names) == len(edits) and sorted(f"{job.key}.json" for job in counted) == names
     said = capsys.readouterr().err
@@ -145,7 +147,8 @@ def test_one_answer_does_not_stand_for_another(done, alone, tmp_path, counted):
     shutil.copytree(done, tmp_path / "out")
     one, other, *_ = sorted((tmp_path / "out" / "rows").iterdir())
     shutil.copy(one, other)
-    focgen.study("memory", CONTROLLER, tmp_path / "out", jobs=1, **SMALL)
+    with answered_here():
+        focgen.study("memory", CONTROLLER, tmp_path / "out", jobs=1, **SMALL)
     assert [f"{job.key}.json" for job in counted] == [other.name]
     assert (tmp_path / "out" / "study.json").read_text() == alone
 

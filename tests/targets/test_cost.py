@@ -16,6 +16,7 @@ import pytest
 from focgen.cli.main import main
 from focgen.codegen.generate import generate
 from focgen.control.controller import Tunable
+from focgen.targets import program
 from focgen.targets.calls import call_costs
 from focgen.targets.cores import CORES, core
 from focgen.targets.cost import cost_of, cost_on
@@ -33,6 +34,30 @@ from tests.targets.test_verify import ZIG, piece
 
 pytest.importorskip("unicorn")
 pytest.importorskip("ziglang")
+
+
+def once(link):
+    """``link`` that gives what the same sources, headers and flags have given before."""
+    made = {}
+
+    def linked(chain, core, sources, script, target, entry, include=(), flags=EXACT):
+        headers = [header for folder in include for header in sorted(folder.glob("*.h"))]
+        read = tuple((file.name, file.read_bytes()) for file in (*sources, script, *headers))
+        key = chain, core.name, entry, tuple(flags), read
+        if key not in made:
+            link(chain, core, sources, script, target, entry, include, flags)
+            made[key] = target.read_bytes()
+        target.write_bytes(made[key])
+
+    return linked
+
+
+@pytest.fixture(scope="module", autouse=True)
+def linked_once():
+    """Several tests ask for the same program on the same core."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(program, "link", once(program.link))
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -33,6 +33,8 @@ pytest.importorskip("ziglang")
 NAMES = [one.name for one in CORES]
 CHAINS = ("zig cc", "arm-none-eabi-gcc")
 OWN = [(name, a) for name in NAMES for a in ("q15", "q31", "f32") if Kernels(name).own(a)]
+ALIKE = {("cortex-m4", "q31"), *(("cortex-m7", a) for a in ("q15", "q31", "f32"))}
+"""Whose kernel is, text for text, that of a smaller core: the Cortex-M3's q31, the Cortex-M4's."""
 
 
 def chain_of(name: str, compiler: str):
@@ -66,8 +68,21 @@ def planned(name: str, arithmetic: str, seeds, lengths):
     return found
 
 
+def test_whose_kernel_is_a_smaller_cores():
+    """What is left to the long suite below has been tried on the core that it is written for."""
+    for name, arithmetic in ALIKE:
+        smaller = "cortex-m3" if arithmetic == "q31" else "cortex-m4"
+        (plan,) = planned(name, arithmetic, (0,), (63,))
+        own, other = (folder_files(plan, b"", kernels=Kernels(core)) for core in (name, smaller))
+        headers = {file for file in own if file.startswith("foc_m")}
+        assert headers and all(own[file] == other[file] for file in headers)
+
+
 @pytest.mark.parametrize("compiler", CHAINS)
-@pytest.mark.parametrize(("name", "arithmetic"), OWN)
+@pytest.mark.parametrize(
+    ("name", "arithmetic"),
+    [pytest.param(*one, marks=pytest.mark.long if one in ALIKE else ()) for one in OWN],
+)
 def test_the_bits_of_the_reference(name, arithmetic, compiler, tmp_path):
     """Remainders of every unrolled loop, both ends of the ring, resets and tracks."""
     chain = chain_of(name, compiler)

@@ -345,11 +345,25 @@ def numbers_of(table, way=()):
         yield from numbers_of(value, (*way, key))
 
 
-@pytest.mark.parametrize("way", list(numbers_of(RIG)), ids=lambda way: ".".join(map(str, way)))
-def test_no_number_of_a_rig_ends_as_nan(tmp_path, way, capsys):
-    """Each of a rig's numbers as large and as small as can be: replayed, and used for a design."""
+@pytest.mark.parametrize(
+    "way, extremes",
+    [
+        pytest.param(
+            way,
+            EXTREMES[half::2],
+            id=f"{'.'.join(map(str, way))}-{half}",
+            marks=() if half == turn % 2 else pytest.mark.long,
+        )
+        for turn, way in enumerate(numbers_of(RIG))
+        for half in (0, 1)
+    ],
+)
+def test_no_number_of_a_rig_ends_as_nan(tmp_path, way, extremes, capsys):
+    """Each of a rig's numbers as large and as small as can be: replayed, and used for a design. Every other
+    extreme here, by turns, the others in the long suite.
+    """
     (tmp_path / "log.csv").write_bytes(seeds.text(60)[0])
-    for number in EXTREMES:
+    for number in extremes:
         rig = copy.deepcopy(RIG)
         holder = functools.reduce(operator.getitem, way[:-1], rig)
         holder[way[-1]] = number

@@ -125,8 +125,14 @@ def tenth_more(number: str) -> str:
     return f"{float(number[:-1]) * 1.1:.9g}f" if number.endswith("f") else str(int(number) * 11 // 10)
 
 
-@pytest.mark.parametrize("arithmetic", ARITHMETICS)
-@pytest.mark.parametrize("mode, which", [(0, 1), (-1, 1), (-1, 2)])
+@pytest.mark.parametrize(
+    "mode, which, arithmetic",
+    [
+        pytest.param(*case, arithmetic, marks=() if i == j else pytest.mark.long)
+        for i, case in enumerate([(0, 1), (-1, 1), (-1, 2)])
+        for j, arithmetic in enumerate(ARITHMETICS)
+    ],
+)
 def test_one_rate_or_weight_wrong(sound, tmp_path, arithmetic, mode, which):
     """A rate by its last digit, of the slowest mode, too: what it keeps shows, though no output does. The
     slowest one's weight by a tenth: its last digit is far below that of anything that is kept.

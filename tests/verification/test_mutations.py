@@ -208,11 +208,12 @@ def rewrite(folder: Path, change) -> None:
 
 
 def cases():
-    """Every fault in one arithmetic, by turns; in the others it is in the long suite."""
-    for name, special in (("spba", PAPER), ("filter", FILTER)):
+    """Every fault in one arithmetic of one controller, by turns; the others are in the long suite."""
+    for which, (name, special) in enumerate((("spba", PAPER), ("filter", FILTER))):
         for turn, fault in enumerate(EITHER + UNUSABLE + special):
+            here = fault in special or turn // 2 % 2 == which
             for i, arithmetic in enumerate(fault.where):
-                marks = () if i == turn % len(fault.where) else pytest.mark.long
+                marks = () if here and i == turn % len(fault.where) else pytest.mark.long
                 yield pytest.param(name, arithmetic, fault, id=f"{name}-{arithmetic}-{fault}", marks=marks)
 
 
@@ -239,8 +240,14 @@ def test_a_fault_in_the_c_shows_in_the_samples(sound, tmp_path, name, arithmetic
     assert found.differences == (f"{changed}: is not what focgen writes for this controller.toml",)
 
 
-@pytest.mark.parametrize("arithmetic", ARITHMETICS)
-@pytest.mark.parametrize("place", (0, 20, 40))
+@pytest.mark.parametrize(
+    "place, arithmetic",
+    [
+        pytest.param(place, arithmetic, marks=() if i == j else pytest.mark.long)
+        for i, place in enumerate((0, 20, 40))
+        for j, arithmetic in enumerate(ARITHMETICS)
+    ],
+)
 def test_one_weight_wrong_by_its_last_digit(sound, tmp_path, arithmetic, place):
     """The least change of a weight that the text can hold."""
     folder = copied(sound, tmp_path, "spba", arithmetic)
@@ -268,8 +275,14 @@ def neighbour(text: str) -> str:
     return f"{np.nextafter(value, np.copysign(np.float32(np.inf), value)):.9g}f"
 
 
-@pytest.mark.parametrize("arithmetic", ("q31", "f32"))
-@pytest.mark.parametrize("macro", ("REF_LSB", "U_LSB", "SCHED_LSB", "SAMPLE_TIME"))
+@pytest.mark.parametrize(
+    "macro, arithmetic",
+    [
+        pytest.param(macro, arithmetic, marks=() if i % 2 == j else pytest.mark.long)
+        for i, macro in enumerate(("REF_LSB", "U_LSB", "SCHED_LSB", "SAMPLE_TIME"))
+        for j, arithmetic in enumerate(("q31", "f32"))
+    ],
+)
 def test_a_scale_of_the_header(sound, tmp_path, arithmetic, macro, capsys):
     """No sample depends on it, and every program that uses the controller does."""
     folder = copied(sound, tmp_path, "spba", arithmetic)

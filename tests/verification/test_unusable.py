@@ -188,7 +188,7 @@ def test_what_is_strewn_is_of_every_kind():
 
 
 @pytest.mark.parametrize(
-    "seed", [*range(500, 520), *(pytest.param(s, marks=pytest.mark.long) for s in range(520, 600))]
+    "seed", [*range(500, 510), *(pytest.param(s, marks=pytest.mark.long) for s in range(510, 600))]
 )
 def test_no_usable_input_overflows(seed):
     """The largest usable inputs, with the signs that are worst and at random: all stays finite; and nothing
@@ -280,9 +280,21 @@ int main(int count, char **arguments)
 """
 
 
-@pytest.mark.parametrize("flags", [["-O2"], ["-O3", "-ffast-math"], ["-Ofast", "-flto"]], ids=" ".join)
-@pytest.mark.parametrize("name", ["gcc", "clang"])
-@pytest.mark.parametrize("arithmetic", ["f32", "f64"])
+@pytest.mark.parametrize(
+    "arithmetic, name, flags",
+    [
+        pytest.param(
+            arithmetic,
+            name,
+            flags,
+            id=f"{arithmetic}-{name}-{' '.join(flags)}",
+            marks=() if (turn + i + j) % 2 == 0 else pytest.mark.long,
+        )
+        for turn, arithmetic in enumerate(["f32", "f64"])
+        for i, name in enumerate(["gcc", "clang"])
+        for j, flags in enumerate([["-O2"], ["-O3", "-ffast-math"], ["-Ofast", "-flto"]])
+    ],
+)
 def test_the_test_survives_fast_math(arithmetic, name, flags, tmp_path: Path):
     """Its compilers may take comparisons of NaN for granted; this one is of bits."""
     plan = build_plan(lead(), arithmetic)
