@@ -74,7 +74,9 @@ def _beside(e: Explanation, base: Fit, role: str) -> TakenUp | None:
         if after > (1.0 - _SETTLED) * left:
             break
         part, best, left = part + asked, tried, after
-    return TakenUp(gone(e, base), odds_over(e, base, left, 1), role, part) if part else None
+    if not part or (not e.best.problem.families and best.predictable_share > NUMBERS.left):
+        return None  # held against nothing, it is to explain the segment
+    return TakenUp(gone(e, base), odds_over(e, base, left, 1), role, part)
 
 
 def _asked(of: Fit, shape: np.ndarray, weighing: Weighing) -> float:

@@ -37,6 +37,12 @@ def _rings(values: Values, den: Polynomial) -> bool:
     return bool(abs(np.imag(damped)) < 2.0 * _SWINGS)
 
 
+def _is_light(values: Values, den: Polynomial) -> bool:
+    """Whether a mode is as lightly damped as its family says: where it stops at the most that it may be, it
+    only follows what is quick, and stands for something else."""
+    return bool(values[-1] < _STOPS * _DAMPING.upper)
+
+
 def _mode_response(period: float, damping: float, s: Complex) -> Complex:
     w: Any = 2.0 * np.pi / period
     made: Complex = w * w / (s * s + 2.0 * damping * w * s + w * w)
@@ -54,6 +60,7 @@ _STARTS = tuple(0.02 * 1.16**k for k in range(41))
 _PERIOD = Parameter(PERIOD, time=1, lower=0.002, upper=30.0, starts=_STARTS, log=True)
 _SWINGS = 0.8  # damping from which on a step overshoots by less than 1.5 %
 _DAMPING = Parameter("damping", lower=0.005, upper=0.3, starts=(0.1,), log=True)
+_STOPS = 0.98  # of that
 
 EFFECT = Effect(
     name="resonance",
@@ -69,6 +76,7 @@ EFFECT = Effect(
             (_PERIOD, _DAMPING),
             _series,
             response=lambda values, s: _mode_response(values[0], values[1], s),
+            itself=_is_light,
         ),
         # driven by the pressure, not by the slower motion beside it: larger, and with a phase of its own
         Form(
@@ -82,6 +90,7 @@ EFFECT = Effect(
             ),
             _beside,
             response=_beside_response,
+            itself=_is_light,
         ),
         # the actuator's own spring swings a mass, against the damping that it has
         Form(
