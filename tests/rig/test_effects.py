@@ -212,3 +212,11 @@ def test_a_reading_that_is_but_flat_is_no_fold():
     run = Run.of([5], [0.0], 0.1)
     assert np.ptp(folded.act(x, flat, run)) < 1e-12 and not folded.itself(flat, ())
     assert np.all(np.diff(folded.act(x, back, run)) < 0.0) and folded.itself(back, ())
+
+
+@pytest.mark.parametrize("damping, rings", [(0.05, True), (0.25, True), (0.3, False)])
+def test_a_mode_as_damped_as_it_may_be_does_not_ring(damping, rings):
+    """A gauge that feels the acceleration is one of 0.3, with 20 times the motion, and no resonance."""
+    den = TransferFunction([(1.0, 0.0)], [(0.4, 0.8), (1.0, 0.0)]).den
+    assert form_of("resonance", "series").itself((0.2, damping), den) == rings
+    assert form_of("resonance", "beside").itself((-19.5, -12.2, 0.1, damping), den) == rings
