@@ -286,16 +286,21 @@ def _resampled(
 def _held_means(grid: Array, step: float, at: Array, values: Array) -> Array:
     """The mean, over the sample that begins at each of ``grid`` (n,), of what is held at ``values`` (m,) from
     ``at`` on: a step between two samples is not put off to the next, which a rig that adds up would keep."""
-    summed = np.empty(len(at))  # up to each of ``at``; by parts and in place, for logs may be long
+    slight, base = _SLIGHT * float(np.ptp(values)), values[0]
+    if not slight:
+        return np.full(len(grid), base)
+    summed = np.empty(
+        len(at)
+    )  # of what is above the first; up to each of ``at``; by parts and in place, for logs may be long
     summed[0] = 0.0
     np.subtract(at[1:], at[:-1], out=summed[1:])
-    summed[1:] *= values[:-1]
+    summed[1:] *= values[:-1] - base
     np.cumsum(summed, out=summed)
-    made, slight = np.empty(len(grid)), _SLIGHT * float(np.ptp(values))
+    made = np.empty(len(grid))
     for first in range(0, len(grid), _PART):
         ends = np.append(grid[first : first + _PART], grid[min(first + _PART, len(grid)) - 1] + step)
-        reached = np.interp(ends, at, summed) + values[-1] * np.maximum(ends - at[-1], 0.0)
-        held, means = between("command", ends[:-1], at, values), np.diff(reached) / step
+        reached = np.interp(ends, at, summed) + (values[-1] - base) * np.maximum(ends - at[-1], 0.0)
+        held, means = between("command", ends[:-1], at, values), base + np.diff(reached) / step
         made[first : first + _PART] = np.where(np.abs(means - held) > slight, means, held)
     return made
 

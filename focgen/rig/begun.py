@@ -66,7 +66,8 @@ def _extended(run: Run) -> tuple[Run, Array]:
         for part in (t[0] - h * np.arange(len(past), 0, -1), t)
     ]
     kept = [s + len(past) + np.arange(n) for s, past, n in zip(starts, pasts, lengths)]
-    long = replace(run, rest=rest, clock=np.concatenate(clock), begins=())
+    stands = tuple(place for place, gap in zip(run.stands, gaps) if gap is None)
+    long = replace(run, rest=rest, clock=np.concatenate(clock), begins=(), stands=stands)
     duration = max(run.duration, h * max(b - a for a, b in long.spans))
     return replace(long, duration=duration), np.concatenate(kept)
 

@@ -24,7 +24,7 @@ from focgen.logs.experiment import Experiment
 from focgen.rig.engine import Chain, Placed, between_of
 from focgen.rig.initial import NOTE as ESTIMATED
 from focgen.rig.response import integrations, longest, response_time
-from focgen.rig.rig import Rig
+from focgen.rig.rig import LinearActuator, Rig
 from focgen.rig.session import joined, run_of
 from focgen.rig.stages import ENTERS, LEAVES, STAGES
 
@@ -92,13 +92,18 @@ def recalled(
 ) -> tuple[Experiment, ...]:
     """The experiments, each that begins with an input of 0, or goes on from the last, with what the earlier
     ones put in; as they are where that would not show, or come no ``closer``, or in a rig that integrates."""
-    if len(logs) < 2 or not all(map(len, logs)) or integrations(rig):
+    if len(logs) < 2 or not all(map(len, logs)) or integrations(rig) or _integrates(rig):
         return tuple(logs)
     past = memory(rig, logs)
     found = tuple(
         _recalled(log, [other for other in logs if ended(other) <= log.start], past) for log in logs
     )
     return found if _shows(rig, placed, logs, found, closer) else tuple(logs)
+
+
+def _integrates(rig: Rig) -> bool:
+    """Whether the actuator does, whatever its sensor makes of it."""
+    return isinstance(rig.actuator, LinearActuator) and rig.actuator.integrates
 
 
 def memory(rig: Rig, logs: Sequence[Experiment]) -> float:

@@ -11,6 +11,7 @@ import pytest
 from focgen.cli.main import main
 from focgen.errors import LogError
 from focgen.logs import read_logs
+from focgen.logs.clock import on_grid
 from focgen.rig.files import write_rig
 from focgen.rig.rig import Signals
 from tests.conftest import paper_rig
@@ -152,6 +153,16 @@ def test_time_stamps_with_jitter_are_resampled_and_said(tmp_path):
     assert np.array_equal(log.raw_time, time)
     applied = STEP * np.sum(log["command"])
     assert applied == pytest.approx(1.5 * (time[0] + STEP * len(log) - time[10]))
+
+
+@pytest.mark.parametrize("level", [0.3, 1e6])
+def test_a_command_that_stands_still_stays_what_it_was(level):
+    """Whatever sums of it are rounded to."""
+    time = STEP * (np.arange(3000) + np.random.default_rng(3).uniform(-0.4, 0.4, 3000))
+    commands = {"command": np.full(3000, level)}, {"command": np.where(time < 10.0, level, level + 1.0)}
+    for signals, levels in zip(commands, (1, 3)):
+        _, found, _ = on_grid(time, signals, STEP, "log")
+        assert len(set(found["command"])) == levels and set(signals["command"]) <= set(found["command"])
 
 
 def test_rounded_time_stamps_are_uniform(tmp_path):

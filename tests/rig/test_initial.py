@@ -304,6 +304,50 @@ def test_of_a_rig_that_integrates_is_told_where_it_stood(place, told, curvature)
     np.testing.assert_allclose(made, seen, atol=0.05)
 
 
+AXIS = LinearActuator(TransferFunction([(1.0, 0.0)], [(1.0, 1.0)]))
+
+
+def axis_log(place=0.0, late=0, held=1, seed=1):
+    """An axis that moves from the first sample on, its output so many samples ``late`` and ``held``."""
+    t = 0.01 * np.arange(1200)
+    u = 1.0 + 0.3 * np.sin(t)
+    y = place + t + 0.3 * (1.0 - np.cos(t)) + 0.01 * np.random.default_rng(seed).normal(size=len(t))
+    y = np.r_[np.full(late, y[0]), y[: len(y) - late]]
+    return Experiment("move", 0.01, {"pressure": u, "output": np.repeat(y[::held], held)[: len(y)]})
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("how", [{"late": 5}, {"held": 10}, {"late": 5, "held": 10}])
+def test_what_is_late_or_read_seldom_is_no_place(how, seed):
+    rig = Rig("axis", 0.01, RIG.signals, AXIS)
+    assert begun(rig, [axis_log(seed=seed, **how)])[0].stands == 0.0
+    assert begun(rig, [axis_log(2.0, seed=seed, **how)])[0].stands == pytest.approx(2.0, abs=0.07)
+
+
+def test_a_sensor_that_lets_no_constant_through_shows_no_place():
+    gyro = TransferFunction([(1.0, 1.0)], [(0.05, 1.0), (1.0, 0.0)])
+    rig = Rig("axis", 0.01, RIG.signals, AXIS, sensor=gyro)
+    assert begun(rig, [axis_log(2.0)])[0].stands == 0.0
+
+
+def test_a_place_told_anew_takes_the_old_one_with_it():
+    rig, log = Rig("axis", 0.01, RIG.signals, AXIS), axis_log(2.0)
+    log = replace(log, signals={**log.signals, "curvature": log["output"]})
+    (told,) = begun(rig, [log])
+    assert told.stands and told.begins and NOTE in told.notes
+    (again,) = begun(replace(rig, actuator=replace(AXIS, offset=2.0)), [told])
+    assert (again.stands, dict(again.begins), again.notes) == (0.0, {}, ())
+
+
+def test_of_a_log_that_goes_on_no_place_is_told():
+    """It has its past ahead of it, be it that its sensor shows the rate alone."""
+    gyro = TransferFunction([(1.0, 1.0)], [(0.05, 1.0), (1.0, 0.0)])
+    rig, log = Rig("axis", 0.01, RIG.signals, AXIS, sensor=gyro), axis_log(2.0)
+    log = replace(log, signals={**log.signals, "curvature": log["output"]})
+    parts = [replace(log.between(None, 6.0), name="first"), replace(log.between(6.01, None), name="second")]
+    assert set(focgen.replay(rig, parts).logs) == {"first", "second"}
+
+
 def test_a_window_of_a_log_forgets_the_begin_of_the_whole():
     log = replace(session(seed=1)[0], begins={"command": Begin((0.5,))})
     assert log.between(None, 10.0).begins and not log.between(1.0, None).begins

@@ -46,9 +46,9 @@ def begun_session(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...
 def _told(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
     """The experiments with the begins that their own first samples tell."""
     found = begun(rig, logs)
-    if not any(log.begins for log in found):
+    if not any(log.begins or log.stands for log in found):
         return found
-    at_rest = tuple(replace(log, begins={}) for log in logs)
+    at_rest = tuple(replace(log, begins={}, stands=0.0) for log in logs)
     for _ in range(_AGAIN):
         found = begun(_refitted(rig, found)[0], found)
     better = _refitted(rig, found)[1] < _refitted(rig, at_rest)[1]
@@ -58,7 +58,7 @@ def _told(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
 def begun_with(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
     """The experiments with their begins told anew by the rig with the effects ``placed`` in it; a session at
     rest as it is."""
-    return begun(rig, logs, placed) if any(log.begins for log in logs) else tuple(logs)
+    return begun(rig, logs, placed) if any(log.begins or log.stands for log in logs) else tuple(logs)
 
 
 def _refitted(rig: Rig, logs: Sequence[Experiment]) -> tuple[Rig, float]:

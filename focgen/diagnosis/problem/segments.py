@@ -150,7 +150,7 @@ class Segment:
         rest[np.cumsum([0, *counts[:-1]])] = 1
         run = replace(self.run, h=self.run.h * factor, rest=rest, clock=clock, rough=True)
         thin = replace(self, x=x, y=y, trust=trust, asked=asked, run=run, between=False)
-        return replace(thin, input_modes=input_modes, loose=loose)
+        return replace(thin, input_modes=input_modes, loose=loose, passed={})
 
     def recent(self, signal: np.ndarray) -> np.ndarray:
         """``signal`` (n,), less what it was a ``pace`` ago."""
@@ -223,17 +223,15 @@ def make(
         np.zeros((len(x), 0)),
         wanted=_asked(logs, x, closed) if any(closed) else np.zeros(0),
         band=dead_band(y),
-        passed=_passed(logs, entry, exit),
+        passed=_passed(logs, entry),
     )
     rows = _readings(logs, exit)
     return whole if rows is None else whole.read_at(rows)
 
 
-def _passed(logs: Sequence[Experiment], entry: str, exit: str) -> dict[str, np.ndarray]:
-    """By role the logged signals (n,) ahead of the output, of order one: its own input only where more than
-    one stage lies between, for one stage alone answers at once as it may."""
-    last = _ORDER.index(entry) + (len(between(entry, exit)) > 1)
-    roles = [role for role in _ORDER[:last] if all(role in log for log in logs)]
+def _passed(logs: Sequence[Experiment], entry: str) -> dict[str, np.ndarray]:
+    """By role the logged signals (n,) up to the input, of order one."""
+    roles = [r for r in _ORDER[: _ORDER.index(entry) + 1] if all(r in log for log in logs)]
     signals = {role: joined(logs, role) for role in roles}
     return {role: x / (float(np.max(np.abs(x))) or 1.0) for role, x in signals.items()}
 

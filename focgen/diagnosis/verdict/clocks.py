@@ -76,7 +76,7 @@ def _asked(of: Fit, problem: Problem, rate: float, step: float, weighing: Weighi
     now = innovations(of.problem, of.vector, weighing)
     toward = innovations(_paced(problem, rate + step), of.vector, weighing) - now
     size, along = float(toward @ toward), float(now @ toward)
-    if along**2 < 2.0 * NUMBERS.nats * size * float(now @ now) / len(now):
+    if not size or along**2 < 2.0 * NUMBERS.nats * size * float(now @ now) / len(now):
         return 0.0
     return -step * along / size
 

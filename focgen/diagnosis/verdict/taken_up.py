@@ -17,6 +17,7 @@ from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, jacobian
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import Problem
+from focgen.diagnosis.problem.segments import stages_of
 from focgen.diagnosis.verdict.instead import Instead, gone, is_likelier, likeliest, odds_over
 from focgen.rig.kernels import innovations as innovated
 
@@ -26,7 +27,8 @@ _SETTLED = 1e-3  # of the sum of squares: less is no descent
 
 @dataclass(frozen=True, eq=False)
 class TakenUp(Instead):
-    """An output that has a ``part`` of the signal of a ``role`` in it, as of their largest magnitudes."""
+    """An output that has the signal of a ``role`` in it, where that is largest a ``part`` of its own largest
+    magnitude."""
 
     role: str
     part: float
@@ -35,8 +37,8 @@ class TakenUp(Instead):
     def may_be(self) -> str:
         """As of :class:`Instead`."""
         return (
-            f"the output may ({self.sure:.0%}) take up the {self.role} at once, {abs(self.part):.2g} of its "
-            "reach, past what is between; look at the gauge, its place and its cable"
+            f"the output may ({self.sure:.0%}) take up the {self.role} at once, past what is between: up to "
+            f"{self.part:+.2g} of the output's largest; look at the gauge, its place and its cable"
         )
 
 
@@ -55,8 +57,12 @@ def is_taken_up(e: Explanation) -> bool:
 
 
 def _judged(e: Explanation, base: Fit) -> TakenUp | None:
-    """The likeliest signal beside what ``base`` has, None where none helps it."""
-    tried = [_beside(e, base, role) for role in e.segment.passed]
+    """The likeliest signal beside what ``base`` has, None where none helps it: the segment's own input only
+    where more than one stage lies between, for one stage alone answers at once as it may."""
+    segment, stages = e.segment, stages_of(e.nominal.problem.nominals.rig)
+    alone = sum(stage in stages for stage in segment.stages) < 2
+    roles = [role for role in segment.passed if not (alone and role == segment.entry)]
+    tried = [_beside(e, base, role) for role in roles]
     return max((t for t in tried if t is not None), key=lambda t: t.odds, default=None)
 
 
