@@ -111,6 +111,20 @@ def test_where_a_worn_spring_was_and_comes_to_is_in_balance(actuator, form, grow
     assert np.max(np.abs(y - new)) > 0.05 * np.max(np.abs(y))
 
 
+def test_a_spring_rests_where_turns_go_to_and_fro():
+    """Held a little below the furthest it has been: there it is the stiffer the less it is bent, by twice."""
+    rest = np.zeros(N, np.uint8)
+    rest[[0, N // 2]] = 1, BALANCED
+    x = np.where(np.arange(N) < N // 2, 1.0, 0.8)
+    one = Placed("softening", form_of("softening", "pseudo_elastic"), "actuator", (0.5, 0.4))
+    y = Chain(Rig("a", H, Signals("c", "y"), COIL), (one,)).run(
+        x, "actuator", "actuator", replace(RUN, rest=rest)
+    )
+    most, held = np.max(y[: N // 2]), y[N // 2]
+    assert held == pytest.approx(2.0 * 0.8 * further("pseudo_elastic", 0.5, 0.4, held, most, 0.0), rel=1e-6)
+    np.testing.assert_allclose(y[N // 2 :], held, rtol=1e-6)
+
+
 @pytest.mark.parametrize("form, growth, scale", WORN)
 def test_turns_come_to_what_is_solved_for(form, growth, scale):
     placed = Placed("softening", form_of("softening", form), "actuator", (growth, scale))
