@@ -59,8 +59,9 @@ def _place(rig: Rig, log: Experiment, placed: Sequence[Placed], role: str) -> fl
     if white_level(y) < _ROUNDING * float(np.ptp(y)):  # as of rows that a logger filled in
         noise = _UNKNOWN * float(np.ptp(y))
     still = max(min(_moves(made, noise), _moves(off, noise)), _FIRST)
-    place, travelled = float(np.median(off[:still])), float(np.ptp(made[: still + 2]))
-    return place / gain if abs(place) > _APART * noise / np.sqrt(still) + 2.0 * travelled else 0.0
+    place, drifted = float(np.median(off[:still])), abs(np.mean(off[still - 2 : still]) - np.mean(off[:2]))
+    unsure = _APART * noise / np.sqrt(still) + 2.0 * (np.ptp(made[: still + 2]) + drifted)
+    return place / gain if abs(place) > unsure else 0.0
 
 
 def _moves(signal: Array, noise: float) -> int:

@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 
 from focgen.diagnosis.diagnose import diagnose
+from focgen.fractional.transfer import TransferFunction
+from focgen.logs.experiment import Experiment
+from focgen.rig.rig import LinearActuator, Rig, Signals
 from tests.diagnosis_rig import RIG, session
 
 
@@ -49,3 +52,13 @@ def test_columns_of_two_loggers_are_no_drift(rate, roles, seed):
 def test_what_lies_in_the_rig_is_not_taken_for_it(effect):
     found = diagnose(RIG, session(5, roles=("pressure",), **effect), pictures=False)
     assert found.verdict in ("named", "set") and not said(found)
+
+
+def test_a_command_that_stands_still_tells_no_clock():
+    """Sooner or later it is the same: the division by what another clock changes ended the diagnosis."""
+    t, rng = 0.01 * np.arange(1500), np.random.default_rng(0)
+    lag, quick = (TransferFunction([(1.0, 0.0)], [(T, 1.0), (1.0, 0.0)]) for T in (0.3, 0.05))
+    rig = Rig("still", 0.01, Signals("t", "y", command="u"), LinearActuator(lag), quick)
+    y = 0.3 + np.exp(-t) + 0.01 * rng.normal(size=len(t))
+    found = diagnose(rig, [Experiment("still", 0.01, {"command": np.full(len(t), 0.3), "output": y})])
+    assert found.gap.floor < 0.02 and not said(found)

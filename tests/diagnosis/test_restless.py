@@ -23,20 +23,20 @@ RIG = Rig("arm", H, Signals("t", "y", "u"), LinearActuator(LAG))
 def commands():
     """Three experiments (n,) of levels held for two to five seconds, the last as the first."""
     rng = np.random.default_rng(5)
-    held = [np.repeat(rng.uniform(0.2, 2.0, 10), rng.integers(50, 110, 10)) for _ in range(2)]
+    held = [np.repeat(rng.uniform(0.2, 2.0, 10), rng.integers(100, 190, 10)) for _ in range(2)]
     return [np.r_[np.zeros(50), x] for x in (*held, held[0])]
 
 
 def session(seed, pace=lambda clock: 1.0, seen=lambda y: y, colour=0.0):
     """The logs of a lag whose time constant is so many times T by the session's clock, and what is ``seen``
-    of its output; noise of 0.6 % of it, each sample keeping ``colour`` of the last."""
+    of its output; noise of 0.4 % of it, each sample keeping ``colour`` of the last."""
     rng, logs, start = np.random.default_rng(seed), [], 0.0
     for number, u in enumerate(commands()):
         y, made = 0.0, np.empty(len(u))
         for i, x in enumerate(u):
             made[i] = y
             y += (GAIN * x - y) * -np.expm1(-H / (T * pace(start + i * H)))
-        noise = 0.036 * rng.normal(size=len(u))
+        noise = 0.024 * rng.normal(size=len(u))
         for i in range(1, len(u)):
             noise[i] = colour * noise[i - 1] + np.sqrt(1.0 - colour**2) * noise[i]
         logs.append(Experiment(f"log{number}", H, {"command": u, "output": seen(made) + noise}, start=start))

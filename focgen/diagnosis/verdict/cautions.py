@@ -58,7 +58,7 @@ def the_rest(summary: Summary) -> Iterator[str]:
             "what was found closes less than half of the gap, and the error stays "
             f"{summary.loudness:.1f} times the noise: something else is missing, which it may stand for"
         )
-    for e in {id(e): e for e, _ in summary.causes}.values():
+    for e in {id(e): e for e, _ in summary.causes if e.causes}.values():
         if is_driven(e):
             yield (
                 f"{_within(e)}: what is left has passed through the rig, {disturbed(e).above:.1f} times what "

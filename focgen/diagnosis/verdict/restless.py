@@ -17,18 +17,20 @@ from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.numbers import NUMBERS
 
 _REACH = 2.0  # response times that a motion is felt for
-_RESTS, _MOVES = 0.2, 0.6  # quantiles of the motion: it rests below the first, and moves above the second
-_STILL = 0.02  # of the largest motion: less is a rest, too
+_RESTS, _MOVES = 0.2, 0.6  # quantiles of the motion: it rests below the first, and moves above the second,
+_STILL = 0.02  # or this part of the largest one: less is a rest
 _STRETCHES = 6  # of either, at least
 _SURE = 2.5  # standard errors by which the two are apart
 
 
 def is_restless(e: Explanation) -> bool:
-    """Whether what is left of a segment is far louder where it moves. What rounds is so by nature; errors
-    that add up, or go round in a loop, are left where they come about by neither."""
+    """Whether what is left of a segment is far louder where it moves: twice as much beside an effect, whose
+    form is a little wrong there. What rounds is so by nature; errors that add up, or go round in a loop, are
+    left where they come about by neither."""
     if e.segment.closed or e.segment.pace or e.segment.withheld or e.converter is not None:
         return False
-    return not is_rounded(e.causes) and louder(e) > NUMBERS.loudest
+    most = NUMBERS.loudest * (2.0 if e.causes else 1.0)
+    return not is_rounded(e.causes) and louder(e) > most
 
 
 @lru_cache(maxsize=16)
@@ -41,9 +43,7 @@ def louder(e: Explanation) -> float:
     motion = np.concatenate([_motion(part, reach) for part in made])
     squares = np.concatenate(left) ** 2
     still = max(float(np.quantile(motion, _RESTS)), _STILL * float(np.max(motion)))
-    moved = float(np.quantile(motion, _MOVES))
-    if moved <= still:
-        return 1.0
+    moved = max(float(np.quantile(motion, _MOVES)), still)
     rests, moves = (
         _in_stretches(squares[motion <= still], reach),
         _in_stretches(squares[motion > moved], reach),
