@@ -12,7 +12,7 @@
 #include "kernels.h"
 #include "modes.h"
 
-enum { BALANCED = 2, TURNS = 40 };
+enum { TURNS = 40 };
 static const double FLAT = 0.05, CLOSE = 1e-7; /* Newton's step squares what is missing */
 static const double LOW = 0.003;               /* of the scale: 1 mm of a tank that is filled to 0.3 m */
 

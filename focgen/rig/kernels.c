@@ -10,8 +10,6 @@
 #include "kernels.h"
 #include "modes.h"
 
-enum { BALANCED = 2 };
-
 /* A session's signals are made and left again thousands of times a second. The C library gives memory of their size back to the system
  * each time, and has it cleared page by page when it asks anew, which takes longer than most loops here: it keeps some instead. */
 void focgen_keep_memory(void)

@@ -182,11 +182,17 @@ def power_creep(x: Array, rest: Bytes, h: float, tau: float, scale: float, power
 
 def rational(x: Array, rest: Bytes, b: Array, a: Array) -> Array:
     """A discrete filter with numerator ``b`` and denominator ``a`` (a[0] = 1), of any length."""
-    order = max(len(a), len(b), _REGISTERS) - 1
-    scratch, *tables = np.zeros((3, order + 1))
-    for table, values in zip(tables, (b, a)):
-        table[: len(values)] = values
+    order, tables, scratch = _padded((b, a), _REGISTERS)
     return _call("focgen_filter", x, rest, order, *_doubles(*tables, scratch))
+
+
+def _padded(sides: Sequence[Array], least: int = 1) -> tuple[int, Sequence[Array], Array]:
+    """The order of a discrete filter, its ``sides`` of one length, ``least`` or more, and room as long."""
+    order = max(*map(len, sides), least) - 1
+    scratch, *tables = np.zeros((len(sides) + 1, order + 1))
+    for table, values in zip(tables, sides):
+        table[: len(values)] = values
+    return order, tables, scratch
 
 
 def plant(
@@ -234,10 +240,7 @@ def bent_modes(
 
 def bent_rational(x: Array, rest: Bytes, b: Array, c: Array, a: Array, spring: Sequence[float]) -> Array:
     """As :func:`rational`, with ``c`` the numerator for what ``spring`` (10,) takes from the input."""
-    order = max(len(a), len(b), len(c)) - 1
-    scratch, *tables = np.zeros((4, order + 1))
-    for table, values in zip(tables, (b, c, a)):
-        table[: len(values)] = values
+    order, tables, scratch = _padded((b, c, a))
     pointers = _doubles(*tables, np.array(spring, float), scratch)
     return _call("focgen_bent_filter", x, rest, order, *pointers)
 
@@ -270,10 +273,7 @@ def _row_with(name: str, x: Array, rest: Bytes, row: tuple[Any, ...], law: tuple
 def _filter_with(name: str, x: Array, rest: Bytes, sides: tuple[Array, ...], law: tuple[Any, ...]) -> Array:
     """The same over a discrete filter."""
     by, numbers, course = law
-    order = max(map(len, sides)) - 1
-    scratch, *tables = np.zeros((4, order + 1))
-    for table, values in zip(tables, sides):
-        table[: len(values)] = values
+    order, tables, scratch = _padded(sides)
     *pointers, own, each, room = _doubles(*tables, np.array(numbers, float), course, scratch)
     return _call(name, x, rest, order, *pointers, by, own, each, room)
 
@@ -289,10 +289,7 @@ def levered_modes(
 
 def levered_rational(x: Array, rest: Bytes, b: Array, a: Array, lever: Sequence[float]) -> Array:
     """As :func:`rational`, with the input as strong as ``lever`` (3,) says."""
-    order = max(len(a), len(b)) - 1
-    scratch, *tables = np.zeros((3, order + 1))
-    for table, values in zip(tables, (b, a)):
-        table[: len(values)] = values
+    order, tables, scratch = _padded((b, a))
     pointers = _doubles(*tables, np.array(lever, float), scratch)
     return _call("focgen_levered_filter", x, rest, order, *pointers)
 

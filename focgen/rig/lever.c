@@ -6,7 +6,7 @@
 #include "kernels.h"
 #include "modes.h"
 
-enum { BALANCED = 2, TURNS = 40 };
+enum { TURNS = 40 };
 static const double FAR = 1.1, LEAST = 0.05, FLAT = 0.05, CLOSE = 1e-13;
 
 static double strength(const double *lever, double y, double *slope)

@@ -9,7 +9,7 @@
 #include "kernels.h"
 #include "modes.h"
 
-enum { BALANCED = 2, BY_LEVEL = 1, BY_SPEED = 2, TURNS = 40 };
+enum { BY_LEVEL = 1, BY_SPEED = 2, TURNS = 40 };
 static const double CLOSE = 1e-7;
 
 /* w where the response is y. */

@@ -17,7 +17,7 @@
 #include "bent.h"
 #include "kernels.h"
 
-enum { BALANCED = 2, DIPS = 3 };
+enum { DIPS = 3 };
 static const double NEAR = 0.1, BESIDE = 0.03; /* how far Taylor series go: of q, as a part of it; of powers and exponentials */
 static const double SAME = 0.01;    /* part of its steepness by which q's differs along a displacement that is as good as another */
 static const double FEW = 0.1;      /* part of its steepness that q loses where it is taken from the way since 0 */

@@ -29,9 +29,7 @@ def run_bent(
     follows ``dynamics``; the response counts as linear between samples, and the delay is exact in whole
     samples only."""
     x = _in_lines(x, rest, between)
-    b, a = discrete(transfer, h, between == Between.HELD)
-    c, _ = discrete(transfer, h, False)
-    made = kernels.bent_rational(x, rest, b, c, a, dynamics.bending(transfer.dc_gain))
+    made = kernels.bent_rational(x, rest, *_sides(transfer, h, between), dynamics.bending(transfer.dc_gain))
     return delayed(made, rest, h, delay) if delay else made
 
 
@@ -48,9 +46,7 @@ def run_paced(
     fastest, whose pace ``slowness`` tells."""
     x = _in_lines(x, rest, between)
     if transfer.is_integer:
-        b, a = discrete(transfer, h, between == Between.HELD)
-        c, _ = discrete(transfer, h, False)
-        return kernels.paced_rational(x, rest, b, c, a, slowness)
+        return kernels.paced_rational(x, rest, *_sides(transfer, h, between), slowness)
     gain, row, missing = row_of(transfer, h, about_as_long(duration))
     by, (own, *pace), share = slowness
     made = kernels.paced_modes(x, rest, *row, (by, (own / gain, *pace), share))
@@ -90,9 +86,7 @@ def run_weak(
     gives way as ``wear`` says, in the response's unit."""
     x = _in_lines(x, rest, between)
     if transfer.is_integer:
-        b, a = discrete(transfer, h, between == Between.HELD)
-        c, _ = discrete(transfer, h, False)
-        return kernels.weak_rational(x, rest, b, c, a, wear)
+        return kernels.weak_rational(x, rest, *_sides(transfer, h, between), wear)
     gain, row, missing = row_of(transfer, h, about_as_long(duration))
     by, (growth, scale, before, own), given = wear
     per = abs(gain)
@@ -104,3 +98,11 @@ def run_weak(
 def _in_lines(x: Array, rest: Bytes, between: Between | bool) -> Array:
     """The input (n,) for loops that take it in straight lines: a smooth one with its bends sharpened."""
     return sharpened(np.ascontiguousarray(x, float), rest) if between == Between.SMOOTH else x
+
+
+def _sides(transfer: TransferFunction, h: float, between: Between | bool) -> tuple[Array, Array, Array]:
+    """The numerators for the input and for what of the response comes back, which runs in lines, and the
+    denominator."""
+    b, a = discrete(transfer, h, between == Between.HELD)
+    c, _ = discrete(transfer, h, False)
+    return b, c, a

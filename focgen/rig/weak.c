@@ -9,7 +9,7 @@
 #include "kernels.h"
 #include "modes.h"
 
-enum { BALANCED = 2, BY_LARGEST = 1, BY_WORK = 2, BY_RETREAT = 3, TURNS = 8, HALVINGS = 50 };
+enum { BY_LARGEST = 1, BY_WORK = 2, BY_RETREAT = 3, TURNS = 8, HALVINGS = 50 };
 static const double LEAST = 0.2, MOST = 1.8, CLOSE = 1e-9;
 
 typedef struct {

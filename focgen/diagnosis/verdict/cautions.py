@@ -14,9 +14,9 @@ from focgen.diagnosis.hypotheses.rivals import Cause
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.verdict.confidence import nominal_instead
 from focgen.diagnosis.verdict.predicted_improvement import paths
-from focgen.diagnosis.verdict.restless import is_restless, louder
+from focgen.diagnosis.verdict.restless import louder
 from focgen.diagnosis.verdict.summary import Summary, doubts
-from focgen.diagnosis.verdict.unexplained import disturbed, is_driven
+from focgen.diagnosis.verdict.unexplained import acts_besides, disturbed, is_driven
 
 _NEAR = 0.95  # of the error without any effect: with more a family is not near
 
@@ -58,13 +58,13 @@ def the_rest(summary: Summary) -> Iterator[str]:
             "what was found closes less than half of the gap, and the error stays "
             f"{summary.loudness:.1f} times the noise: something else is missing, which it may stand for"
         )
-    for e in {id(e): e for e, _ in summary.causes if e.causes}.values():
+    for e in {id(e): e for e, _ in summary.causes}.values():
         if is_driven(e):
             yield (
                 f"{_within(e)}: what is left has passed through the rig, {disturbed(e).above:.1f} times what "
                 "is quick in it, and no input predicts it: something else acts there, which it may stand for"
             )
-        elif is_restless(e):
+        elif acts_besides(e):
             yield (
                 f"{_within(e)}: what is left is {np.sqrt(louder(e)):.1f} times as large where the rig moves "
                 "as where it rests, which noise is not: something else acts there, which it may stand for"
