@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TypeVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
 
@@ -21,10 +21,13 @@ from focgen.diagnosis.numbers import NUMBERS
 
 @dataclass(frozen=True, eq=False)
 class Instead:
-    """What no effect is, ``instead`` of these families, and the log ``odds`` of it over what was found."""
+    """What no effect is, ``instead`` of these families, and the log ``odds`` of it over what was found.
+    ``fills``: whether these make up for what other families' forms lack, which a refit of those does less of,
+    and not these for what is there instead."""
 
     instead: frozenset[str]
     odds: float
+    fills: ClassVar[bool] = False
 
     @property
     def sure(self) -> float:
@@ -78,13 +81,16 @@ def gone(e: Explanation, base: Fit) -> frozenset[str]:
 def sound_part(e: Explanation, others: Sequence[Instead | None]) -> Explanation | None:
     """The explanation without the families instead of which ``others`` are likelier; None where none is, or
     all are in question. What stays, stays as it was fitted beside them, and so does how much inputs predict:
-    a refit would make up for what is there instead."""
-    out = frozenset[str]().union(*(other.instead for other in others if other and is_likelier(other)))
+    a refit would make up for what is there instead. Where only what ``fills`` is in question, it is fitted
+    again."""
+    likelier = [other for other in others if other and is_likelier(other)]
+    out = frozenset[str]().union(*(other.instead for other in likelier))
     kept = tuple(c for c in e.causes if c.rivals[0].effect not in out)
     if not out or not kept:
         return None
     left = [c for c in e.best.problem.candidates if c.effect in out]
-    return replace(e, best=without(e.best, left, Weighing(e.ar)), causes=kept, whole=e)
+    parted = left_out if all(other.fills for other in likelier) else without
+    return replace(e, best=parted(e.best, left, Weighing(e.ar)), causes=kept, whole=e)
 
 
 def odds_over(e: Explanation, base: Fit, left: float, free: int, things: int = 1) -> float:

@@ -24,6 +24,7 @@ from focgen.diagnosis.verdict.predicted_improvement import paths, promised
 from focgen.diagnosis.verdict.taken_up import taken_up
 from focgen.diagnosis.verdict.uneven import unevenly_paced
 from focgen.diagnosis.verdict.unexplained import is_unknown
+from focgen.diagnosis.verdict.unsteady import unsteady
 from focgen.logs.experiment import Experiment
 from focgen.rig.rig import Rig
 
@@ -138,7 +139,8 @@ def _summary(
 
 def doubts(e: Explanation) -> tuple[Instead | None, ...]:
     """What no effect is, and may be there instead of what was found."""
-    return changed_at_once(e), logged_late(e), clocks_apart(e), unevenly_paced(e), taken_up(e)
+    elsewise = changed_at_once(e), logged_late(e), clocks_apart(e), unevenly_paced(e), taken_up(e)
+    return *elsewise, *unsteady(e)
 
 
 def sound_parts(explanations: Sequence[Explanation]) -> dict[Explanation, Explanation]:

@@ -16,6 +16,7 @@ from focgen.diagnosis.verdict.outside import from_outside
 from focgen.diagnosis.verdict.restless import is_restless
 from focgen.diagnosis.verdict.taken_up import is_taken_up
 from focgen.diagnosis.verdict.uneven import is_uneven
+from focgen.diagnosis.verdict.unsteady import is_unsteady
 from focgen.rig.effects import library
 
 
@@ -36,7 +37,15 @@ def is_unknown(e: Explanation) -> bool:
     if (
         e.causes
         and not is_rounded(e.causes)
-        and (from_outside(e) or another(e) or is_late(e) or are_apart(e) or is_uneven(e) or is_taken_up(e))
+        and (
+            from_outside(e)
+            or another(e)
+            or is_late(e)
+            or are_apart(e)
+            or is_uneven(e)
+            or is_taken_up(e)
+            or is_unsteady(e)
+        )
     ):
         return True
     if e.predictability.share < NUMBERS.left:
