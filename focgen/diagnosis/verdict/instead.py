@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import ClassVar, TypeVar
@@ -60,17 +60,17 @@ def likeliest(e: Explanation, judged: Callable[[Explanation, Fit], T | None]) ->
     return max((one for one in found if one is not None), key=lambda one: one.odds, default=None)
 
 
-def bases(e: Explanation) -> Iterator[Fit]:
+@lru_cache(maxsize=16)
+def bases(e: Explanation) -> tuple[Fit, ...]:
     """The fits that it may stand beside: without any effect, and without each of several. None where a
     rounding was found: its steps are no noise, and what is smaller than they are tells nothing. None where
     this is what is not in question of a whole that was asked."""
     if is_rounded(e.causes) or e.whole is not None:
-        return
-    yield e.nominal
+        return ()
     candidates = e.best.problem.candidates
-    families = {c.effect for c in candidates}
-    for effect in sorted(families) if len(families) > 1 else ():
-        yield left_out(e.best, [c for c in candidates if c.effect == effect], Weighing(e.ar))
+    families = sorted(e.best.problem.families) if len(e.best.problem.families) > 1 else ()
+    fewer = ([c for c in candidates if c.effect == effect] for effect in families)
+    return e.nominal, *(left_out(e.best, gone, Weighing(e.ar)) for gone in fewer)
 
 
 def gone(e: Explanation, base: Fit) -> frozenset[str]:

@@ -1,9 +1,9 @@
 """Whether what was found is there by as much all along, or is the form of something else.
 
 An effect whose form is right explains its part of every stretch of the session. What only looks like it is
-followed well where much hangs on it and badly elsewhere: there the form, at the size found, is too much or too
-little. So every stretch says by itself how many times the effect is there, with all that the rig's own numbers
-and the other effects can make up for taken out. Stretches of a right form agree.
+followed well where much hangs on it and badly elsewhere: there the form, at the size found, is too much or
+too little. So every stretch says by itself how many times the effect is there: of what it changes beside a rig
+whose own numbers, and other effects, have made up for it as far as they can. Stretches of a right form agree.
 """
 
 from __future__ import annotations
@@ -14,16 +14,14 @@ from functools import lru_cache
 import numpy as np
 from scipy.special import chdtri
 
-from focgen.arrays import Array
-from focgen.diagnosis.fitting.fit import Weighing, innovations, jacobian
+from focgen.arrays import Array, Ints
+from focgen.diagnosis.fitting.fit import Weighing, innovations
 from focgen.diagnosis.hypotheses.explain import Explanation
-from focgen.diagnosis.hypotheses.rivals import without
 from focgen.diagnosis.numbers import NUMBERS
-from focgen.diagnosis.verdict.instead import Instead, bases, is_likelier
+from focgen.diagnosis.verdict.instead import Instead, bases, gone, is_likelier
 
 _STRETCHES = 4  # of an experiment
 _CHANCE = 0.01  # that noise alone makes stretches differ by as much as is taken off
-_NOTHING = 1e-9  # of the largest: a direction about which nothing is known
 
 
 @dataclass(frozen=True)
@@ -36,7 +34,7 @@ class Stretch:
     within: float
 
     def __str__(self) -> str:
-        return f"{self.times:.1f} times from {self.within:.4g} s on in {self.experiment}"
+        return f"{self.times:.1f} times what was found from {self.within:.4g} s on in {self.experiment}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +51,8 @@ class Unsteady(Instead):
     def may_be(self) -> str:
         """As of :class:`Instead`."""
         return (
-            f"something may act ({self.sure:.0%}) that is there by as much nowhere: as this effect it would "
-            f"differ by {self.by:.0%} (root mean square), {self.most}, {self.least}; compare the two"
+            f"something else may act ({self.sure:.0%}): told from one stretch alone it is {self.most}, and "
+            f"{self.least}, where an effect is as large in both; compare these stretches"
         )
 
 
@@ -62,9 +60,13 @@ class Unsteady(Instead):
 def unsteady(e: Explanation) -> tuple[Unsteady, ...]:
     """For every family found how likely it is something else, by how differently it is there; none where a
     rounding was found."""
-    if not e.causes or next(bases(e), None) is None:
-        return ()
-    found = (_judged(e, family) for family in e.best.problem.families)
+    weighing, found = Weighing(e.ar), []
+    left = innovations(e.best.problem, e.best.vector, weighing)
+    for base in bases(e):
+        out = gone(e, base)
+        if len(out) == 1:
+            shape = innovations(base.problem, base.vector, weighing) - left
+            found.append(_judged(e, out, shape, left))
     return tuple(one for one in found if one is not None)
 
 
@@ -73,10 +75,10 @@ def is_unsteady(e: Explanation) -> bool:
     return any(is_likelier(one) for one in unsteady(e))
 
 
-def _judged(e: Explanation, family: str) -> Unsteady | None:
-    """As likely as none of the families is beforehand where stretches differ by as much as a form is wrong,
-    and by the fourth power more."""
-    shape, left = _alone(e, family)
+def _judged(e: Explanation, out: frozenset[str], shape: Array, left: Array) -> Unsteady | None:
+    """An effect that changes the innovations ``left`` (n,) by a ``shape`` (n,): as likely as none of the
+    families is beforehand where stretches differ by as much as a form is wrong, and by the fourth power
+    more."""
     stretches = [s for s in _stretches_of(e) if np.any(shape[s])]
     if len(stretches) < 2:
         return None
@@ -87,7 +89,7 @@ def _judged(e: Explanation, family: str) -> Unsteady | None:
     odds = float(np.log(prior) + 4.0 * np.log(max(by, 1e-12) / NUMBERS.form))
     telling = np.sqrt(weight) * (times - weight @ times / weight.sum())
     most, least = (_stretch(e, stretches[i], float(times[i])) for i in (telling.argmax(), telling.argmin()))
-    return Unsteady(frozenset({family}), odds, by, most, least)
+    return Unsteady(out, odds, by, most, least)
 
 
 def _differ(weight: Array, times: Array, left: float, count: int) -> float:
@@ -98,31 +100,13 @@ def _differ(weight: Array, times: Array, left: float, count: int) -> float:
     return float(np.sqrt(max(weight @ (times - mean) ** 2 - noise, 0.0) / weight.sum()))
 
 
-def _alone(e: Explanation, family: str) -> tuple[Array, Array]:
-    """What a family changes of the innovations, and these (n,), each less what all else in the fit could make
-    up for, as far as that is not known beforehand."""
-    best, weighing = e.best, Weighing(e.ar)
-    problem, now = best.problem, innovations(best.problem, best.vector, weighing)
-    own = [c for c in problem.candidates if c.effect == family]
-    shape = without(best, own, weighing).innovations - now
-    rows = jacobian(problem, best.vector, now, weighing, *problem.bounds())[:-1]
-    entries = [c.effect != family for c in problem.candidates for _ in c.form.parameters]
-    kept = np.r_[np.ones(problem.head, bool), np.array(entries, bool)] & rows.any(axis=1)
-    scale = np.linalg.norm(rows[kept], axis=1)
-    others, known = rows[kept] / scale[:, None], problem.known[1][kept] / scale**2
-    normal = others @ others.T + np.diag(known * (now @ now) / len(now))
-    both = np.array([shape, now])
-    shape, left = both - np.linalg.lstsq(normal, others @ both.T, rcond=_NOTHING)[0].T @ others
-    return shape, left
-
-
-def _stretches_of(e: Explanation) -> list[Array]:
+def _stretches_of(e: Explanation) -> list[Ints]:
     """The samples of every stretch, experiments apart."""
     spans = e.segment.run.spans
     return [s for first, last in spans for s in np.array_split(np.arange(first, last), _STRETCHES) if len(s)]
 
 
-def _stretch(e: Explanation, samples: Array, times: float) -> Stretch:
+def _stretch(e: Explanation, samples: Ints, times: float) -> Stretch:
     run = e.segment.run
     number, first = next((i, first) for i, (first, last) in enumerate(run.spans) if samples[0] < last)
     return Stretch(times, e.segment.names[number], float(samples[0] - first) * run.h)
