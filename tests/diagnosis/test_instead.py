@@ -4,6 +4,7 @@ Red when a pace that is uneven, or a command logged late, beside a cause that is
 whole segment `unknown`, or when a cause that is in question stays.
 """
 
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import pytest
@@ -12,7 +13,7 @@ from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.verdict import instead, summary
 from focgen.diagnosis.verdict.instead import Instead, sound_part
 
-DOUBTS = ("changed_at_once", "logged_late", "clocks_apart", "unevenly_paced", "taken_up")
+DOUBTS = ("changed_at_once", "logged_late", "clocks_apart", "unevenly_paced", "taken_up", "unsteady")
 
 
 def explained(monkeypatch, *families):
@@ -29,6 +30,12 @@ def explained(monkeypatch, *families):
     monkeypatch.setattr(instead, "is_rounded", lambda causes: False)
     causes = tuple(SimpleNamespace(rivals=[SimpleNamespace(effect=n)]) for n in families)
     return Explanation(None, None, None, fitted(families), None, causes, None, None, {})
+
+
+def asked(monkeypatch, doubt, other):
+    """Has one of the doubts answer ``other``; every effect may be unsteady."""
+    several = (other,) if other else ()
+    monkeypatch.setattr(summary, doubt, lambda e: several if doubt == "unsteady" else other)
 
 
 CREEPS, STICKS, ALL = (frozenset(names) for names in ({"creep"}, {"dead_zone"}, {"creep", "dead_zone"}))
@@ -53,13 +60,27 @@ def test_the_sound_part_is_what_is_not_in_question(monkeypatch, others, kept):
         assert part.whole is e and not list(instead.bases(part))  # what is sound is asked no more
 
 
+@dataclass(frozen=True, eq=False)
+class Fills(Instead):
+    fills = True
+
+
+@pytest.mark.parametrize("kind, again", [(Fills, True), (Instead, False)])
+def test_what_stays_is_fitted_again_only_without_what_filled_its_gaps(monkeypatch, kind, again):
+    e = explained(monkeypatch, "creep", "dead_zone")
+    monkeypatch.setattr(instead, "left_out", lambda best, gone, weighing: (*gone, "again"))
+    monkeypatch.setattr(instead, "without", lambda best, gone, weighing: (*gone, "as it was"))
+    gone, how = sound_part(e, [kind(CREEPS, 3.0)]).best
+    assert gone.effect == "creep" and how == ("again" if again else "as it was")
+    assert sound_part(e, [Fills(CREEPS, 3.0), Instead(CREEPS, 3.0)]).best[1] == "as it was"
+
+
 @pytest.mark.parametrize("doubt", DOUBTS)
 @pytest.mark.parametrize("unknown", [False, True])
 def test_whatever_is_there_instead_the_sound_part_stands_where_it_explains(monkeypatch, doubt, unknown):
     e = explained(monkeypatch, "creep", "dead_zone")
     for name in DOUBTS:
-        other = Instead(CREEPS, 3.0) if name == doubt else None
-        monkeypatch.setattr(summary, name, lambda e, other=other: other)
+        asked(monkeypatch, name, Instead(CREEPS, 3.0) if name == doubt else None)
     monkeypatch.setattr(summary, "is_unknown", lambda e: unknown)
     sound = [c.rivals[0].effect for part in summary.sound_parts([e]).values() for c in part.causes]
     assert sound == ([] if unknown else ["dead_zone"])
@@ -68,5 +89,5 @@ def test_whatever_is_there_instead_the_sound_part_stands_where_it_explains(monke
 def test_of_one_cause_there_is_no_part(monkeypatch):
     e = explained(monkeypatch, "creep")
     for name in DOUBTS:
-        monkeypatch.setattr(summary, name, lambda e: Instead(CREEPS, 3.0))
+        asked(monkeypatch, name, Instead(CREEPS, 3.0))
     assert summary.sound_parts([e]) == {}

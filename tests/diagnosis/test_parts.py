@@ -288,6 +288,7 @@ def _explained(monkeypatch, ratio, share, left=_STEADY, effects=(), closed=False
     monkeypatch.setattr(unexplained, "is_late", lambda e: False)
     monkeypatch.setattr(unexplained, "is_uneven", lambda e: False)
     monkeypatch.setattr(unexplained, "is_taken_up", lambda e: False)
+    monkeypatch.setattr(unexplained, "is_unsteady", lambda e: False)
     monkeypatch.setattr(unexplained, "is_restless", lambda e: False)
     nominal, best = (SimpleNamespace(weighed=np.full(4, np.sqrt(v))) for v in (1.0, ratio))
     return SimpleNamespace(

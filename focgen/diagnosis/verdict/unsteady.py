@@ -2,8 +2,9 @@
 
 An effect whose form is right explains its part of every stretch of the session. What only looks like it is
 followed well where much hangs on it and badly elsewhere: there the form, at the size found, is too much or
-too little. So every stretch says by itself how many times the effect is there: of what it changes beside a rig
-whose own numbers, and other effects, have made up for it as far as they can. Stretches of a right form agree.
+too little. So every stretch says by itself how many times the effect is there: of what it changes beside a
+rig whose own numbers, and other effects, have made up for it as far as they can. Stretches of a right form
+agree.
 """
 
 from __future__ import annotations
