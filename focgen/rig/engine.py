@@ -10,7 +10,6 @@ import numpy as np
 from focgen.arrays import Array
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
-from focgen.present import present
 from focgen.rig import chamber, lags, linear, solved, uneven
 from focgen.rig import plant as plants
 from focgen.rig.begun import from_there, past_of, with_past
@@ -272,8 +271,9 @@ def _actuator(
         steps = _yielding(steps, actuator, weak, dynamics, lever, between)
         return [*zero, *drive, *steps]
     line = (actuator.gain, lambda x, run: actuator.drive(x), None)
-    lag = _lag(1.0, actuator.T, actuator.alpha, dynamics.without("mass"), delay)
-    steps = [lag, *_swung(actuator.T, dynamics.mass)]
+    steps = _swung(actuator.dynamics, dynamics, Between.STRAIGHT, delay) or [
+        _lag(1.0, actuator.T, actuator.alpha, dynamics, delay)
+    ]
     return [line, *drive, *_yielding(steps, actuator, weak, dynamics, lever, Between.STRAIGHT)]
 
 
@@ -311,8 +311,8 @@ def _linear(
         return [_transfer(actuator.dynamics, between, delay)]
     if dynamics.flow != FREE:
         return _choked(actuator, dynamics, between, delay)
-    if dynamics.mass:
-        return _massive(actuator, dynamics, between, delay)
+    if swung := _swung(actuator.dynamics, dynamics, between, delay):
+        return swung
     plant, changed = plants.plant_of(actuator.dynamics), dynamics.changed
     if plant is not None and (changed == {"drag"} or (plant.order == 2 and changed & IN_STEPS)):
         return [_plant(plant, dynamics, between, delay)]
@@ -337,27 +337,19 @@ def _choked(
     return [*_linear(actuator, others, between, delay), behind]
 
 
-def _massive(
-    actuator: LinearActuator, dynamics: Dynamics, between: Between | bool, delay: float
-) -> list[Step]:
-    """With a further mass: of whole orders one more term in the equation, of a fractional lag as of that."""
-    light, of = dynamics.without("mass"), actuator.dynamics
-    if plants.plant_of(of) is None:
-        _, T, _ = present(linear.single_lag(of))
-        return [*_linear(actuator, light, between, delay), *_swung(T, dynamics.mass)]
+def _swung(of: TransferFunction, dynamics: Dynamics, between: Between | bool, delay: float) -> list[Step]:
+    """With a further mass, one more term in the equation; none without one. Where a lag changes in other
+    ways, too, it is run as that, and then what the mass makes of its response, which runs in lines."""
+    if not dynamics.mass:
+        return []
+    light = dynamics.without("mass")
     den = {t.order: t.coefficient for t in of.den}
     den[2.0] = den.get(2.0, 0.0) + dynamics.mass * den[0.0]
-    heavy = TransferFunction(of.num, [(c, order) for order, c in sorted(den.items(), reverse=True)])
-    return _linear(replace(actuator, dynamics=heavy), light, between, delay)
-
-
-def _swung(T: float, mass: float) -> list[Step]:
-    """What a mass makes of a lag's response: exactly that of mass D² y + T D y + y where the lag is of order
-    1; from one sample to the next the response runs in a line."""
-    if not mass:
-        return []
-    swing = TransferFunction([(T, 1.0), (1.0, 0.0)], [(mass, 2.0), (T, 1.0), (1.0, 0.0)])
-    return [_transfer(swing, Between.STRAIGHT, 0.0)]
+    heavy = [(c, order) for order, c in sorted(den.items(), reverse=True)]
+    if light != UNCHANGED and plants.plant_of(of) is None:
+        swing = _transfer(TransferFunction(of.den, heavy), Between.STRAIGHT, 0.0)
+        return [*_linear(LinearActuator(of), light, between, delay), swing]
+    return _linear(LinearActuator(TransferFunction(of.num, heavy)), light, between, delay)
 
 
 def _plant(plant: plants.Plant, dynamics: Dynamics, between: Between | bool, delay: float) -> Step:

@@ -29,7 +29,10 @@ def _mass(x: Dynamics, values: Values, run: None) -> Dynamics:
 
 
 def _rings(values: Values, den: Polynomial) -> bool:
-    """Whether a mass swings on its spring: where it hardly overshoots it creeps back, and is one lag more."""
+    """Whether a mass swings on its spring: where it hardly overshoots it creeps back, and is one lag more. No
+    lag does what it does beside a springpot."""
+    if any(t.order % 1.0 for t in den):
+        return True
     others = [t for t in den[:-1] if t.order != 2.0]
     own = sum(t.coefficient for t in den if t.order == 2.0)
     s = 1j / np.sqrt((values[0] / (2.0 * np.pi)) ** 2 + own / den[-1].coefficient)
