@@ -4,7 +4,7 @@ Red when a pace that is uneven, or a command logged late, beside a cause that is
 whole segment `unknown`, or when a cause that is in question stays.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import pytest
@@ -91,3 +91,22 @@ def test_of_one_cause_there_is_no_part(monkeypatch):
     for name in DOUBTS:
         asked(monkeypatch, name, Instead(CREEPS, 3.0))
     assert summary.sound_parts([e]) == {}
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_part_that_brings_nothing_closer_leaves_its_segment_unknown(monkeypatch, whole):
+    """What explained the rest was no effect: the rig's own numbers were said to be all that is off."""
+    e = explained(monkeypatch, "creep")
+    of = explained(monkeypatch, "creep", "dead_zone") if whole else None
+    e = replace(e, whole=of, segment=SimpleNamespace(pace=0.0))
+    nothing = SimpleNamespace(in_vain=False, more_is_left=False, causes=[])
+    for name, answer in {
+        "crossed": [],
+        "is_unknown": False,
+        "_no_closer": [e],
+        "_unaccounted": False,
+        "_summary": nothing,
+    }.items():
+        monkeypatch.setattr(summary, name, lambda *a, answer=answer: answer)
+    found = summary.sorted_out(None, [], None, [e], granted=False)
+    assert found.unknown == ([e] if whole else [])

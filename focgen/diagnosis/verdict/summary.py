@@ -94,8 +94,10 @@ def sorted_out(
         return _summary(rig, logs, rigs, explanations, unknown)
 
     out = [] if granted else crossed(rig, logs, explanations)
-    unknown = [e for e in explanations if e in out or is_unknown(e)]
-    apart = [e for e in _no_closer(rig, logs, rigs, explanations) if e not in unknown]
+    apart = _no_closer(rig, logs, rigs, explanations)
+    # of a part that is no closer, the rest was something that no effect is
+    unknown = [e for e in explanations if e in out or is_unknown(e) or (e in apart and e.whole is not None)]
+    apart = [e for e in apart if e not in unknown]
     summary = summary_without([*unknown, *apart])
     if granted:
         return SortedOut(summary, unknown, [], [])
