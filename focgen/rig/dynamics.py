@@ -35,13 +35,15 @@ class Friction:
 @dataclass(frozen=True)
 class Spring:
     """A hysteretic spring: its ``share`` of the stiffness; ``loading`` and ``unloading`` in 1/output, for a
-    ``power`` other than 1 at displacements of ``scale``, in units of the output."""
+    ``power`` other than 1 at displacements of ``scale``, in units of the output. Where it is ``added``, it
+    bears so much of the stiffness beside all of that, instead of a part of it."""
 
     share: float = 0.0
     loading: float = 0.0
     unloading: float = 0.0
     power: float = 1.0
     scale: float = 1.0
+    added: bool = False
 
 
 @dataclass(frozen=True)

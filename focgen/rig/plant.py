@@ -83,6 +83,7 @@ def respond(
     ``rough``: steps of a hysteretic or bent spring are twice as long, with an error below 1e-3 of the
     motion, and no step is shorter than a 32nd of a sample before an event.
     """
+    plant, dynamics = _whole(plant, dynamics)
     base, last = _levels(plant, dynamics, h, rough)
     falling = replace(plant, c=plant.c / dynamics.unloading)
     tables, spring, bend = _tables(plant, h, base, last), dynamics.spring, dynamics.bend
@@ -96,6 +97,19 @@ def respond(
     x = np.ascontiguousarray(x, float)
     moves, levels = course(x, rest, between), (plant.order, base, last)
     return kernels.plant(x, rest, moves, levels, np.array(numbers), tables)
+
+
+def _whole(plant: Plant, dynamics: Dynamics) -> tuple[Plant, Dynamics]:
+    """An added hysteretic spring as its share of both."""
+    spring = dynamics.spring
+    if not spring.added:
+        return plant, dynamics
+    both = 1.0 + spring.share
+    share = replace(spring, share=spring.share / both, added=False)
+    # an obstacle and a bend are shares of the linear spring
+    bend = replace(dynamics.bend, first=dynamics.bend.first / both, second=dynamics.bend.second / both)
+    whole = replace(dynamics, spring=share, bend=bend, stiffness=dynamics.stiffness / both)
+    return replace(plant, k=plant.k * both), whole
 
 
 def _levels(plant: Plant, dynamics: Dynamics, h: float, rough: bool = False) -> tuple[int, int]:

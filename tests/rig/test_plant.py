@@ -3,6 +3,8 @@
 Red when friction or a hysteretic spring departs from the exact motion.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -113,8 +115,9 @@ def _integrated(plant, spring, x, t):
         y, v, q = state
         p = q * np.sign(v)
         K = spring.loading if p > 0 else -spring.unloading
+        taken = q if spring.added else q - y
         steep = 1.0 - K * abs(p) ** spring.power * spring.scale ** (1 - spring.power)
-        return [v, (np.interp(now, t, x) - plant.k * y - soft * (q - y) - plant.c * v) / plant.m, v * steep]
+        return [v, (np.interp(now, t, x) - plant.k * y - taken * soft - plant.c * v) / plant.m, v * steep]
 
     how = dict(t_eval=t, method="DOP853", rtol=1e-9, atol=1e-12, max_step=H)
     return solve_ivp(slope, (0.0, t[-1]), [0.0, 0.0, 0.0], **how).y[0]
@@ -127,6 +130,7 @@ def _integrated(plant, spring, x, t):
         Spring(0.9, 6.0, 25.0),
         Spring(0.5, 4.0, 25.0, 1.5, 0.1),
         Spring(0.5, 1.0, 3.0, 0.8, 0.1),
+        Spring(0.9, 6.0, 25.0, added=True),
     ],
 )
 def test_a_hysteretic_spring_against_an_integrator(spring):
@@ -137,6 +141,16 @@ def test_a_hysteretic_spring_against_an_integrator(spring):
     np.testing.assert_allclose(made, exact, atol=1e-6 * np.max(np.abs(exact)))
     plain = respond(plant, x, rest(len(x)), H)
     assert np.max(np.abs(made - plain)) > 0.05 * np.max(np.abs(exact))
+
+
+def test_what_stands_beside_an_added_spring_is_a_share_of_the_linear_one():
+    """A spring that never lets go is linear: with it, a bend and an obstacle are those of the sum."""
+    x, plant = 2 * np.sin(0.1 * np.arange(400)), Plant(2, 0.5, 0.3, 40.0)
+    beside = {"bend": Bend(0.5, 0.2, 0.05), "place": 0.03, "stiffness": 2.0}
+    made = respond(plant, x, rest(len(x)), H, Dynamics(spring=Spring(1.0, 0.0, 0.0, added=True), **beside))
+    halved = {"bend": Bend(0.25, 0.1, 0.05), "place": 0.03, "stiffness": 1.0}
+    wanted = respond(replace(plant, k=80.0), x, rest(len(x)), H, Dynamics(**halved))
+    np.testing.assert_allclose(made, wanted, atol=1e-4 * np.max(np.abs(wanted)))
 
 
 def test_a_plant_that_only_creeps_takes_few_steps_and_comes_as_close():

@@ -20,12 +20,19 @@ def _sharp_spring(x: Dynamics, values: Values, run: None) -> Dynamics:
     return replace(x, spring=Spring(share, loading / scale, unloading / scale, power, scale))
 
 
+def _added_spring(x: Dynamics, values: Values, run: None) -> Dynamics:
+    added, loading, unloading, scale = values
+    return replace(x, spring=Spring(added, loading / scale, unloading / scale, 1.0, scale, added=True))
+
+
 def _lost_motion(x: Array, values: Values, run: Run) -> Array:
     return kernels.play(x, run.rest, values[0])
 
 
 # of the stiffness: Bouc and Wen's spring takes it over, and is as stiff where a motion begins
 _SHARE = Parameter("share", lower=0.0, upper=1.0, starts=(0.2, 0.5), zero=0.0)
+# beside the stiffness that was found where all of it has slid
+_ADDED = Parameter("added", lower=0.0, upper=3.0, starts=(0.2, 0.8), zero=0.0)
 # of its stiffness: what a spring wound to the largest displacement has lost; below 0 it stiffens
 _LOADING = Parameter("loading", lower=-3.0, upper=30.0, starts=(0.5, 0.0))
 _UNLOADING = Parameter("unloading", lower=-3.0, upper=30.0, starts=(0.5, 1.0))
@@ -50,6 +57,7 @@ EFFECT = Effect(
         *_loops.forms("drive"),
         Form("spring", "dynamics", (_SHARE, _LOADING, _UNLOADING, LARGEST), _spring),
         Form("sharp_spring", "dynamics", (_SHARE, _LOADING, _UNLOADING, _POWER, LARGEST), _sharp_spring),
+        Form("added_spring", "dynamics", (_ADDED, _LOADING, _UNLOADING, LARGEST), _added_spring),
         *_loops.behind("place"),
         # what is seen is taken along with play by what moves
         Form("lost_motion", "response", (_LOST,), _lost_motion),
