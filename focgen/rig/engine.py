@@ -290,8 +290,9 @@ def _yielding(
     of, alone = actuator.dynamics, dynamics == UNCHANGED
     if weak and alone and lever == SAME and can_be_solved(weak):
         return solved_weak(of, weak, between)
-    steps = _levered(of, lever, between) if alone and lever != SAME else levered(steps, lever)
-    return weakened(steps, weak, of.dc_gain)
+    if alone and lever != SAME:
+        steps, lever = _levered(of, lever, between), SAME
+    return weakened(steps, weak, of.dc_gain, lever) if weak else levered(steps, lever)
 
 
 def _levered(of: TransferFunction, lever: Lever, between: Between | bool) -> list[Step]:

@@ -15,9 +15,9 @@ from focgen.rig.dynamics import SAME, Lever
 from focgen.rig.effects import Run
 from focgen.rig.turns import Act, by_turns, in_a_row
 
-_TURNS = 40
+_TURNS = 20
 _FEW = 4  # where hypotheses are only ranked
-_CLOSE = 1e-8  # of the largest response: what a turn may still change
+_CLOSE = 1e-6  # of the largest response: what a turn may still change
 
 
 def levered(steps: Sequence[Any], lever: Lever) -> list[Any]:

@@ -17,6 +17,7 @@ from focgen.arrays import Array
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
 from focgen.rig import solved
+from focgen.rig.dynamics import SAME, Lever
 from focgen.rig.effects import Form, Run
 from focgen.rig.kernels import Wear
 from focgen.rig.turns import Act, by_turns, in_a_row
@@ -49,14 +50,14 @@ class Weak(Protocol):
         """Where the spring would be with what bends a nominal one by ``x`` (n,)."""
 
 
-def weakened(steps: Sequence[Any], weak: Sequence[Any], gain: float) -> list[Any]:
-    """The ``steps`` of an actuator that answers 1 with ``gain`` when held, with what is ``weak`` in it. Where
-    nothing is, the same steps."""
+def weakened(steps: Sequence[Any], weak: Sequence[Any], gain: float, lever: Lever = SAME) -> list[Any]:
+    """The ``steps`` of an actuator that answers 1 with ``gain`` when held, with what is ``weak`` in it, and
+    driven by a ``lever``: one turn is of both. Where nothing is weak, the same steps."""
     if not weak:
         return list(steps)
     kept = after(weak)
     keys: tuple[Hashable, ...] = tuple(key for key, *_ in (*steps, *kept))
-    return [(keys, _bent([act for _, act, _ in steps], weak, gain), None), *kept]
+    return [((lever, *keys), _bent([act for _, act, _ in steps], weak, gain, lever), None), *kept]
 
 
 def after(weak: Sequence[Any]) -> list[Any]:
@@ -75,12 +76,13 @@ def solved_weak(of: TransferFunction, weak: Sequence[Any], between: Between | bo
     return [((of, between, *(key for key, *_ in kept)), act, None), *kept]
 
 
-def _bent(acts: Sequence[Act], weak: Sequence[Weak], gain: float) -> Act:
+def _bent(acts: Sequence[Act], weak: Sequence[Weak], gain: float, lever: Lever) -> Act:
     nominal = in_a_row(acts)
 
     def respond(x: Array, run: Run) -> Array:
         def further(y: Array) -> Array:
-            return nominal(x + (1.0 - stiffness(y, weak, run)) * y / gain, run)
+            driven = x if lever == SAME else x * lever.strength(y)
+            return nominal(driven + (1.0 - stiffness(y, weak, run)) * y / gain, run)
 
         return by_turns(nominal(x, run), further, _FEW if run.rough else _TURNS, _CLOSE)
 

@@ -88,6 +88,36 @@ def test_a_mass_on_a_spring_that_wears_in_small_steps(form, growth, scale):
     assert next(iter(left.values())) == pytest.approx(work if "work" in left else most, rel=0.01)
 
 
+def test_what_wears_is_pulled_by_a_lever_and_rubs_at_once():
+    """Of 0.04 y'' + 0.2 y' + y/further + friction = 2 x g(y): friction cannot be solved for with the others,
+    and the turns are of all of them."""
+    y = v = most = 0.0
+    fine, exact, rub = 40, [], 0.15
+    for now, after in zip(X, [*X[1:], X[-1]]):
+        exact.append(y)
+        for i in range(fine):
+            pull = y / further("worn", 0.4, 0.8, y, most, 0.0)
+            x = (now + (after - now) * i / fine) * (1.0 - 0.2 * np.clip(y / 3.0, -1.1, 1.1))
+            free = 2.0 * x - 0.2 * v - pull
+            drag = np.clip(free + 0.04 * v * fine / H, -2.0 * rub, 2.0 * rub)  # it stops what would turn
+            v += H / fine * (free - drag) / 0.04
+            y += H / fine * v
+            most = max(most, abs(y))
+    named = {
+        "friction": ("coulomb", (rub,)),
+        "softening": ("worn", (0.4, 0.8)),
+        "gain_nonlinearity": ("force_factor", (-0.2, 0.0, 3.0)),
+    }
+    all_of_it = tuple(Placed(n, form_of(n, f), "actuator", values) for n, (f, values) in named.items())
+    rig = Rig("a", H, Signals("c", "y"), COIL)
+    found = Chain(rig, all_of_it).run(X, "regulator", "sensor", RUN)
+    for left_out in range(3):
+        fewer = Chain(rig, all_of_it[:left_out] + all_of_it[left_out + 1 :]).run(
+            X, "regulator", "sensor", RUN
+        )
+        assert np.max(np.abs(found - exact)) < 0.1 * np.max(np.abs(found - fewer))
+
+
 @pytest.mark.parametrize("actuator", [*SOFT, COIL], ids=["K(p)", "pulled", "mass"])
 @pytest.mark.parametrize("form, growth, scale", WORN)
 @pytest.mark.parametrize("carried", [{}, {"largest": 1.0, "work": 3.0}], ids=["new", "used"])
