@@ -35,7 +35,7 @@ class Stretch:
     within: float
 
     def __str__(self) -> str:
-        return f"{self.times:.1f} times what was found from {self.within:.4g} s on in {self.experiment}"
+        return f"{self.times:.1f} times ({self.experiment}, from {self.within:.4g} s on)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +52,8 @@ class Unsteady(Instead):
     def may_be(self) -> str:
         """As of :class:`Instead`."""
         return (
-            f"something else may act ({self.sure:.0%}): told from one stretch alone it is {self.most}, and "
-            f"{self.least}, where an effect is as large in both; compare these stretches"
+            f"something else may act ({self.sure:.0%}): told from one stretch alone it is {self.most} and "
+            f"{self.least} what was found, and an effect is as large in both; compare these stretches"
         )
 
 
