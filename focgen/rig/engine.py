@@ -290,9 +290,9 @@ def _yielding(
     of, alone = actuator.dynamics, dynamics == UNCHANGED
     if weak and alone and lever == SAME and can_be_solved(weak):
         return solved_weak(of, weak, between)
-    if alone and lever != SAME:
-        steps, lever = _levered(of, lever, between), SAME
-    return weakened(steps, weak, of.dc_gain, lever) if weak else levered(steps, lever)
+    if weak:
+        return weakened(steps, weak, of.dc_gain, lever)
+    return _levered(of, lever, between) if alone and lever != SAME else levered(steps, lever)
 
 
 def _levered(of: TransferFunction, lever: Lever, between: Between | bool) -> list[Step]:
@@ -339,18 +339,24 @@ def _choked(
 
 
 def _swung(of: TransferFunction, dynamics: Dynamics, between: Between | bool, delay: float) -> list[Step]:
-    """With a further mass, one more term in the equation; none without one. Where a lag changes in other
-    ways, too, it is run as that, and then what the mass makes of its response, which runs in lines."""
+    """With a further mass, one more term in the equation; none without one. Where other changes are none of a
+    plant's, or an order is close to 1, it is run as it is, and then what the mass makes of its response."""
     if not dynamics.mass:
         return []
-    light = dynamics.without("mass")
+    light, lag = dynamics.without("mass"), linear.single_lag(of)
+    near = lag is not None and 0.0 < abs(lag[2] - 1.0) < _NEAR
+    if not near and (light == UNCHANGED or (of.is_integer and light.changed <= _OF_PLANTS)):
+        return _linear(LinearActuator(_heavier(of, dynamics.mass)), light, between, delay)
+    by = TransferFunction([(1.0, 0.0)], [(lag[1], 1.0), (1.0, 0.0)]) if lag and near else of
+    swing = TransferFunction(by.den, _heavier(by, dynamics.mass).den)
+    return [*_linear(LinearActuator(of), light, between, delay), _transfer(swing, Between.STRAIGHT, 0.0)]
+
+
+def _heavier(of: TransferFunction, mass: float) -> TransferFunction:
+    """With a ``mass`` in s² on its spring."""
     den = {t.order: t.coefficient for t in of.den}
-    den[2.0] = den.get(2.0, 0.0) + dynamics.mass * den[0.0]
-    heavy = [(c, order) for order, c in sorted(den.items(), reverse=True)]
-    if light != UNCHANGED and plants.plant_of(of) is None:
-        swing = _transfer(TransferFunction(of.den, heavy), Between.STRAIGHT, 0.0)
-        return [*_linear(LinearActuator(of), light, between, delay), swing]
-    return _linear(LinearActuator(TransferFunction(of.num, heavy)), light, between, delay)
+    den[2.0] = den.get(2.0, 0.0) + mass * den[0.0]
+    return TransferFunction(of.num, [(c, order) for order, c in den.items()])
 
 
 def _plant(plant: plants.Plant, dynamics: Dynamics, between: Between | bool, delay: float) -> Step:
@@ -388,4 +394,6 @@ def _two_paced(transfer: TransferFunction, paces: tuple[float, float], delay: fl
     )
 
 
+_NEAR = 0.08  # of an order to 1: poles lie too close to the branch cut there, and a dashpot is as good
+_OF_PLANTS = IN_STEPS | {"drag", "bend"}
 _AT_ONCE = TransferFunction([(1.0, 0.0)], [(1e-9, 1.0), (1.0, 0.0)])

@@ -50,7 +50,7 @@ CONSTANTS = {
     "verdict/restless.py": ["_MOVES", "_RESTS", "_STILL", "_SURE"],
     "verdict/taken_up.py": ["_SETTLED"],
     "verdict/pieces.py": ["_PARTS"],
-    "verdict/unsteady.py": ["_CHANCE"],
+    "verdict/unsteady.py": ["_CHANCE", "_NOTHING"],
     "verdict/improvement.py": [
         "_AHEAD",
         "_FITTED",

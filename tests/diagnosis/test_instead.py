@@ -68,11 +68,19 @@ class Fills(Instead):
 @pytest.mark.parametrize("kind, again", [(Fills, True), (Instead, False)])
 def test_what_stays_is_fitted_again_only_without_what_filled_its_gaps(monkeypatch, kind, again):
     e = explained(monkeypatch, "creep", "dead_zone")
-    monkeypatch.setattr(instead, "left_out", lambda best, gone, weighing: (*gone, "again"))
-    monkeypatch.setattr(instead, "without", lambda best, gone, weighing: (*gone, "as it was"))
-    gone, how = sound_part(e, [kind(CREEPS, 3.0)]).best
-    assert gone.effect == "creep" and how == ("again" if again else "as it was")
-    assert sound_part(e, [Fills(CREEPS, 3.0), Instead(CREEPS, 3.0)]).best[1] == "as it was"
+    clocks = SimpleNamespace(references=SimpleNamespace(clocks={"response": 1.0}))
+    e = replace(e, predictability="before", nominal=SimpleNamespace(problem=clocks))
+
+    def fitted(how):
+        return lambda best, gone, weighing: SimpleNamespace(gone=[c.effect for c in gone], weighed=how)
+
+    monkeypatch.setattr(instead, "left_out", fitted("again"))
+    monkeypatch.setattr(instead, "without", fitted("as it was"))
+    monkeypatch.setattr(instead, "predictability", lambda segment, left, response: f"of {left}")
+    part = sound_part(e, [kind(CREEPS, 3.0)])
+    assert part.best.gone == ["creep"] and part.best.weighed == ("again" if again else "as it was")
+    assert part.predictability == ("of again" if again else "before")
+    assert sound_part(e, [Fills(CREEPS, 3.0), Instead(CREEPS, 3.0)]).best.weighed == "as it was"
 
 
 @pytest.mark.parametrize("doubt", DOUBTS)

@@ -58,10 +58,22 @@ def test_an_effect_that_shows_in_one_stretch_has_nothing_to_agree_with():
     assert judged(shape, left) is None
 
 
-def test_a_small_shape_is_not_told_apart_by_what_noise_is_other_than_assumed():
+def test_what_noise_is_other_than_assumed_tells_nothing(monkeypatch):
+    """A small part of what is left goes with an effect, here more and there less: more than chance."""
+    shape, differing = stretches(1, differ=1.0, noise=0.0)
+    left = 0.02 * (-1.0) ** np.arange(len(shape))
+    along = np.sqrt(48.0 / len(shape)) * np.std(left) / np.std(shape)  # of χ², which is 36 by chance
+    left = left + along * differing
+    assert judged(shape, left).by == 0.0
+    monkeypatch.setattr(judging, "NUMBERS", replace(NUMBERS, other=0.0))
+    assert judged(shape, left).by > 0.0
+
+
+@pytest.mark.parametrize("left_of_it", [0.0, 1e-17, 1e-170])
+def test_what_rounding_leaves_of_an_effect_is_no_stretch(left_of_it):
     shape, left = stretches(1, differ=0.0)
-    other = 0.9 * np.sqrt(NUMBERS.other) * np.sin(np.arange(len(shape)) * 0.07)
-    assert judged(0.1 * shape, left + other).by < 0.3
+    shape[LONG // 4 :] *= left_of_it
+    assert judged(shape, left) is None and judged(0.0 * shape, left) is None
 
 
 def earlier_when_full(most):

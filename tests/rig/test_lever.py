@@ -93,3 +93,33 @@ def test_what_it_is_driven_by_there_comes_later_by_its_delay():
 
 def test_a_pull_that_is_the_same_everywhere_is_none():
     np.testing.assert_allclose(made_by(POUCH, (placed((0.0, 0.0, 3.0)),)), made_by(POUCH, ()), atol=1e-12)
+
+
+@pytest.mark.parametrize("actuator", [COIL, POUCH], ids=["mass", "springpot"])
+def test_a_worn_spring_is_pulled_alike_whether_or_not_it_rubs(actuator):
+    """A lever acts on what drives it, not on what the spring no longer bears."""
+    both = (placed((-0.3, 0.0, 2.0)), placed((0.6, 0.8), "softening", "worn"))
+    rubs = (*both, placed((1e-7,), "friction", "coulomb"))
+    bare, rubbed, unworn = (made_by(actuator, effects) for effects in (both, rubs, both[:1]))
+    assert np.max(np.abs(bare - rubbed)) < 2e-3 * np.max(np.abs(bare)) < 0.02 * np.max(np.abs(bare - unworn))
+
+
+@pytest.mark.parametrize(
+    "effect, form, values",
+    [
+        ("unloading_asymmetry", "rising", (0.5,)),
+        ("gain_nonlinearity", "power", (0.5, 2.0, 1.0)),
+        ("dead_zone", "preloaded", (0.2,)),
+    ],
+)
+def test_what_stands_beside_a_mass_is_not_lost(effect, form, values):
+    """A mass too small to matter, on a lag of order 1, changes nothing of what else does."""
+    alone = placed(values, effect, form)
+    tiny = placed((0.004,), "resonance", "mass")
+    for actuator in (
+        Actuator(0.7, 1.0, (2.0,)),
+        LinearActuator(TransferFunction([(2.0, 0.0)], [(0.7, 1.0), (1.0, 0.0)])),
+    ):
+        without, beside, none = (made_by(actuator, e) for e in ((alone,), (tiny, alone), ()))
+        assert np.max(np.abs(without - none)) > 0.1
+        assert np.max(np.abs(beside - without)) < 0.02

@@ -13,6 +13,7 @@ from focgen.diagnosis.belief.choice import beforehand
 from focgen.diagnosis.belief.likelihood import Scale, speaks_or_is_right
 from focgen.diagnosis.belief.standing import sureness
 from focgen.diagnosis.fitting.fit import Fit, Weighing, square_by
+from focgen.diagnosis.fitting.predictability import predictability
 from focgen.diagnosis.hypotheses.converter import is_rounded
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.hypotheses.rivals import left_out, without
@@ -82,15 +83,18 @@ def sound_part(e: Explanation, others: Sequence[Instead | None]) -> Explanation 
     """The explanation without the families instead of which ``others`` are likelier; None where none is, or
     all are in question. What stays, stays as it was fitted beside them, and so does how much inputs predict:
     a refit would make up for what is there instead. Where only what ``fills`` is in question, it is fitted
-    again."""
+    again, and so is how much inputs predict."""
     likelier = [other for other in others if other and is_likelier(other)]
     out = frozenset[str]().union(*(other.instead for other in likelier))
     kept = tuple(c for c in e.causes if c.rivals[0].effect not in out)
     if not out or not kept:
         return None
     left = [c for c in e.best.problem.candidates if c.effect in out]
-    parted = left_out if all(other.fills for other in likelier) else without
-    return replace(e, best=parted(e.best, left, Weighing(e.ar)), causes=kept, whole=e)
+    if not all(other.fills for other in likelier):
+        return replace(e, best=without(e.best, left, Weighing(e.ar)), causes=kept, whole=e)
+    best = left_out(e.best, left, Weighing(e.ar))
+    left_by_it = predictability(e.segment, best.weighed, e.nominal.problem.references.clocks["response"])
+    return replace(e, best=best, causes=kept, predictability=left_by_it, whole=e)
 
 
 def odds_over(e: Explanation, base: Fit, left: float, free: int, things: int = 1) -> float:

@@ -22,6 +22,7 @@ from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.verdict.instead import Instead, bases, gone, is_likelier
 
 _STRETCHES = 4  # of an experiment
+_NOTHING = 1e-12  # of an effect: a stretch with less has nothing of it
 _CHANCE = 0.01  # that noise alone makes stretches differ by as much as is taken off
 
 
@@ -80,8 +81,9 @@ def _judged(e: Explanation, out: frozenset[str], shape: Array, left: Array) -> U
     """An effect that changes the innovations ``left`` (n,) by a ``shape`` (n,): as likely as none of the
     families is beforehand where stretches differ by as much as a form is wrong, and by the fourth power
     more."""
-    stretches = [s for s in _stretches_of(e) if np.any(shape[s])]
-    if len(stretches) < 2:
+    total = float(shape @ shape)
+    stretches = [s for s in _stretches_of(e) if shape[s] @ shape[s] > _NOTHING * total]
+    if len(stretches) < 2 or not total > 0.0:
         return None
     weight = np.array([shape[s] @ shape[s] for s in stretches])
     times = 1.0 + np.array([shape[s] @ left[s] for s in stretches]) / weight

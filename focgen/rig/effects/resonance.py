@@ -29,9 +29,9 @@ def _mass(x: Dynamics, values: Values, run: None) -> Dynamics:
 
 
 def _rings(values: Values, den: Polynomial) -> bool:
-    """Whether a mass swings on its spring: where it hardly overshoots it creeps back, and is one lag more. No
-    lag does what it does beside a springpot."""
-    if any(t.order % 1.0 for t in den):
+    """Whether a mass swings on its spring: where it hardly overshoots it creeps back, and is one lag more.
+    Beside a springpot no lag does what it does, unless that is next to a dashpot."""
+    if any(abs(t.order - round(t.order)) > _DASHPOT for t in den):
         return True
     others = [t for t in den[:-1] if t.order != 2.0]
     own = sum(t.coefficient for t in den if t.order == 2.0)
@@ -64,6 +64,7 @@ _PERIOD = Parameter(PERIOD, time=1, lower=0.002, upper=30.0, starts=_STARTS, log
 _SWINGS = 0.8  # damping from which on a step overshoots by less than 1.5 %
 _DAMPING = Parameter("damping", lower=0.005, upper=0.3, starts=(0.1,), log=True)
 _STOPS = 0.98  # of that
+_DASHPOT = 0.1  # of its order from 1: there a lag comes within 6e-3 of a mass that creeps
 
 EFFECT = Effect(
     name="resonance",
