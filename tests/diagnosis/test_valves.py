@@ -131,3 +131,23 @@ def test_a_valve_that_sticks_is_named_among_all_effects(band, left):
 @pytest.mark.long
 def test_a_sound_loop_has_nothing():
     assert diagnose(RIG, [loop(3, count=2000)], pictures=False).verdict in ("parameters", "none")
+
+
+def swept(band, seed=1):
+    """A triangle up and down, not in a loop, of a valve that slips once it is a band away."""
+    u = np.concatenate([np.linspace(0.0, 100.0, 400), np.linspace(100.0, 0.0, 400)[1:]])
+    x, y, flow = valve(u, band, 0.0, True, 0.0), np.zeros(len(u)), 0.0
+    for k in range(1, len(u)):
+        flow += (1.0 - np.exp(-1.0 / LAG)) * (GAIN * x[k - 1] - flow)
+        y[k] = flow
+    y += np.random.default_rng(seed).normal(0.0, 0.5, len(y))
+    return Experiment("sweep", 1.0, {"command": u, "output": y})
+
+
+@pytest.mark.parametrize("band", [6.3, 11.19, 16.7, 23.0, 31.0])
+def test_a_band_is_found_wherever_it_lies_between_two_starts(band):
+    """Many slips in a row fit no band but theirs."""
+    (e,) = explain_all(RIG, [swept(band)], 12.0, ["valve_stiction"])
+    (first, *_) = e.best.problem.values(e.best.vector)
+    assert first[0] == pytest.approx(band, rel=0.02)
+    assert np.std(e.best.weighed) < 1.2 * 0.5 / e.segment.level_out

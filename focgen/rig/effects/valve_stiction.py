@@ -7,13 +7,17 @@ from focgen.arrays import Array
 from focgen.rig import kernels
 from focgen.rig.effects._effect import PLACE, Effect, Form, Parameter, Run, Values
 
-_BANDS = tuple(0.003 * 1.3**k for k in range(17))  # of the largest command, far above whose swing it may lie
-_LEFTS, _PLACES = (0.0, 0.35, 0.7), (0.0,)
+_BANDS = tuple(0.003 * 1.3**k for k in range(20))  # of the largest command, far above whose swing it may lie
+# many slips in a row fit no band but theirs, within a few hundredths
+_FINE = tuple(0.003 * 1.1**k for k in range(53))
+_LEFTS, _FEW, _PLACES = (0.0, 0.35, 0.7), (0.0, 0.5), (0.0,)
 
 
-def _parameters(*further: Sequence[float]) -> tuple[Parameter, ...]:
+def _parameters(
+    bands: Sequence[float], lefts: Sequence[float], *further: Sequence[float]
+) -> tuple[Parameter, ...]:
     """Band, what of it is left after a slip, and where the valve lay: every combination to begin with."""
-    starts = zip(*product(_BANDS, _LEFTS, *further))
+    starts = zip(*product(bands, lefts, *further))
     band = Parameter("band", level=1, lower=0.0, upper=0.5, starts=next(starts), zero=0.0)
     left = Parameter("left", lower=0.0, upper=0.95, starts=next(starts))
     return (band, left, *(Parameter(PLACE, lower=-1.0, upper=1.0, starts=s, zero=0.0) for s in starts))
@@ -51,10 +55,10 @@ EFFECT = Effect(
         Form("play", "command", (_BAND,), _play),
         Form("stick", "command", (_BAND,), _stick, jumps=True),
         # after a slip it follows until the command turns round, or is held anew at once
-        Form("stick_slip", "command", _parameters(), _slip, jumps=True),
-        Form("slips", "command", _parameters(), _slips, jumps=True),
+        Form("stick_slip", "command", _parameters(_BANDS, _LEFTS), _slip, jumps=True),
+        Form("slips", "command", _parameters(_FINE, _FEW), _slips, jumps=True),
         # a valve that is in use lies anywhere in its band
-        Form("stick_slip_begun", "command", _parameters(_PLACES), _slip, jumps=True),
-        Form("slips_begun", "command", _parameters(_PLACES), _slips, jumps=True),
+        Form("stick_slip_begun", "command", _parameters(_BANDS, _LEFTS, _PLACES), _slip, jumps=True),
+        Form("slips_begun", "command", _parameters(_FINE, _FEW, _PLACES), _slips, jumps=True),
     ],
 )
