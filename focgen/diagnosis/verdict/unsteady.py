@@ -78,8 +78,8 @@ def is_unsteady(e: Explanation) -> bool:
 
 
 def _judged(e: Explanation, out: frozenset[str], shape: Array, left: Array) -> Unsteady | None:
-    """An effect that changes the innovations ``left`` (n,) by a ``shape`` (n,): as likely as none of the
-    families is beforehand where stretches differ by as much as a form is wrong, and by the fourth power
+    """An effect that changes the innovations ``left`` (n,) by a ``shape`` (n,). None of the families is as
+    likely as beforehand where stretches differ by as much as a form is wrong, and by the fourth power of that
     more."""
     total = float(shape @ shape)
     stretches = [s for s in _stretches_of(e) if shape[s] @ shape[s] > _NOTHING * total]
@@ -88,8 +88,9 @@ def _judged(e: Explanation, out: frozenset[str], shape: Array, left: Array) -> U
     weight = np.array([shape[s] @ shape[s] for s in stretches])
     times = 1.0 + np.array([shape[s] @ left[s] for s in stretches]) / weight
     by = _differ(weight, times, float(left @ left), len(left))
-    prior = NUMBERS.elsewhere / (1.0 - NUMBERS.elsewhere)
-    odds = float(np.log(prior) + 4.0 * np.log(max(by, 1e-12) / NUMBERS.form))
+    # what is as likely as beforehand is in every confidence already
+    more = max((by / NUMBERS.form) ** 4 - 1.0, 1e-12)
+    odds = float(np.log(NUMBERS.elsewhere * more))
     telling = np.sqrt(weight) * (times - weight @ times / weight.sum())
     most, least = (_stretch(e, stretches[i], float(times[i])) for i in (telling.argmax(), telling.argmin()))
     return Unsteady(out, odds, by, most, least)
