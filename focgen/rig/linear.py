@@ -30,9 +30,7 @@ from focgen.rig.poles import fractional_poles, residue_at
 from focgen.rig.rig import UNITY
 
 _SPACING = 0.15  # in ln ξ: fine, for poles may lie close to the cut
-_QUICKER = (
-    60.0  # in ln ξ: so far the cut reaches beyond what samples show; an order of 0.3 falls there by 1e-8
-)
+_QUICKER = 60.0  # in ln ξ: so far the cut goes on beyond what samples show; an order of 0.3 falls by 1e-8
 _FASTEST = 1e9  # times that: poles are looked for up to there
 
 

@@ -52,9 +52,7 @@ class Weak(Protocol):
 
 def weakened(steps: Sequence[Any], weak: Sequence[Any], gain: float, lever: Lever = SAME) -> list[Any]:
     """The ``steps`` of an actuator that answers 1 with ``gain`` when held, with what is ``weak`` in it, and
-    driven by a ``lever``: one turn is of both. Where nothing is weak, the same steps."""
-    if not weak:
-        return list(steps)
+    driven by a ``lever``: one turn is of both."""
     kept = after(weak)
     keys: tuple[Hashable, ...] = tuple(key for key, *_ in (*steps, *kept))
     return [((lever, *keys), _bent([act for _, act, _ in steps], weak, gain, lever), None), *kept]
