@@ -26,6 +26,13 @@ def first_sheet_zeros(terms: Polynomial, sector: float) -> Complex:
     Complex zeros come in conjugate pairs. Where a zero lies within 0.02 rad of the sector's edge, it may
     be on either side. Raises ArithmeticError where they cannot be located.
     """
+    return np.exp(zeros_in_log(terms, sector))
+
+
+def zeros_in_log(terms: Polynomial, sector: float) -> Complex:
+    """Return ln s of the same zeros, with |Im ln s| ≤ ``sector``, which may go beyond π: there they lie on
+    the sheets next to the first.
+    """
     if len(terms) < 2:
         return np.empty(0, complex)
     if len(terms) == 2:
@@ -37,9 +44,9 @@ def _two_terms(terms: Polynomial, sector: float) -> Complex:
     (a, high), (b, low) = terms
     order = high - low
     first = 0.0 if b / a < 0 else math.pi
-    turns = np.arange(-math.ceil(order), math.ceil(order) + 1)
-    angles = (first + 2.0 * math.pi * turns) / order
-    made: Complex = abs(b / a) ** (1.0 / order) * np.exp(1j * angles[np.abs(angles) <= sector])
+    most = math.ceil(order * sector / math.pi)
+    angles = (first + 2.0 * math.pi * np.arange(-most, most + 1)) / order
+    made: Complex = math.log(abs(b / a)) / order + 1j * angles[np.abs(angles) <= sector]
     return made
 
 
@@ -117,7 +124,7 @@ class _Sector:
             if len(found) < expected:
                 found = self._with_multiplicity(found)
             if len(found) == expected:
-                return np.exp(found)
+                return np.asarray(found, complex)
             density *= 2.0
         if expected:
             raise ArithmeticError(f"located {len(found)} of {expected} poles")

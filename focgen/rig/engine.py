@@ -340,15 +340,13 @@ def _choked(
 
 def _swung(of: TransferFunction, dynamics: Dynamics, between: Between | bool, delay: float) -> list[Step]:
     """With a further mass, one more term in the equation; none without one. Where other changes are none of a
-    plant's, or an order is close to 1, it is run as it is, and then what the mass makes of its response."""
+    plant's, it is run as it is, and then what the mass makes of its response."""
     if not dynamics.mass:
         return []
-    light, lag = dynamics.without("mass"), linear.single_lag(of)
-    near = lag is not None and 0.0 < abs(lag[2] - 1.0) < _NEAR
-    if not near and (light == UNCHANGED or (of.is_integer and light.changed <= _OF_PLANTS)):
+    light = dynamics.without("mass")
+    if light == UNCHANGED or (of.is_integer and light.changed <= _OF_PLANTS):
         return _linear(LinearActuator(_heavier(of, dynamics.mass)), light, between, delay)
-    by = TransferFunction([(1.0, 0.0)], [(lag[1], 1.0), (1.0, 0.0)]) if lag and near else of
-    swing = TransferFunction(by.den, _heavier(by, dynamics.mass).den)
+    swing = TransferFunction(of.den, _heavier(of, dynamics.mass).den)
     return [*_linear(LinearActuator(of), light, between, delay), _transfer(swing, Between.STRAIGHT, 0.0)]
 
 
@@ -394,6 +392,5 @@ def _two_paced(transfer: TransferFunction, paces: tuple[float, float], delay: fl
     )
 
 
-_NEAR = 0.08  # of an order to 1: poles lie too close to the branch cut there, and a dashpot is as good
 _OF_PLANTS = IN_STEPS | {"drag", "bend"}
 _AT_ONCE = TransferFunction([(1.0, 0.0)], [(1e-9, 1.0), (1.0, 0.0)])

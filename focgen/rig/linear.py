@@ -24,14 +24,11 @@ from focgen.rig.modes import (
     respond,
     settled,
     speeded,
+    swings,
     tables,
 )
-from focgen.rig.poles import fractional_poles, residue_at
+from focgen.rig.real_orders import modes_of
 from focgen.rig.rig import UNITY
-
-_SPACING = 0.15  # in ln ξ: fine, for poles may lie close to the cut
-_QUICKER = 60.0  # in ln ξ: so far the cut goes on beyond what samples show; an order of 0.3 falls by 1e-8
-_FASTEST = 1e9  # times that: poles are looked for up to there
 
 
 def run(
@@ -125,7 +122,8 @@ def _at_samples(
     longest = about_as_long(duration)
     rows, pair, through = _tables(transfer, h, longest)
     made = kernels.modes(x, rest, *rows, pair, through, switching=False)
-    return settled(made, x, rest, _missing(transfer, _fractional(transfer, h, longest)))
+    modes = modes_of(transfer, h, longest)
+    return settled(made + swings(x, rest, h, modes), x, rest, _missing(transfer, modes))
 
 
 def _missing(transfer: TransferFunction, modes: Modes) -> float:
@@ -144,7 +142,7 @@ def _between(
         gain, T, alpha = lag
         modes = fractional_lag(T, alpha, h, longest)
         return gain * settled(between(x, rest, h, modes, share), x, rest, 1.0 - modes.gain)
-    modes = _fractional(transfer, h, longest)
+    modes = modes_of(transfer, h, longest)
     return settled(between(x, rest, h, modes, share), x, rest, _missing(transfer, modes))
 
 
@@ -165,14 +163,12 @@ def row_of(
     """What multiplies the response of the modes, the one row of them that a compiled loop needs, and the gain
     at rest that they lack."""
     lag = single_lag(transfer)
-    if lag:
-        gain, T, alpha = lag
-        a, b0, b1, pair, through = tables(T, alpha, h, duration, 1.0)
-        missing = 1.0 - fractional_lag(T, alpha, h, duration).gain
-    else:
-        gain = 1.0
-        (a, b0, b1), pair, through = _tables(transfer, h, duration)
-        missing = _missing(transfer, _fractional(transfer, h, duration))
+    if not lag:
+        modes = modes_of(transfer, h, duration).in_one_row
+        return 1.0, (*speeded(modes, h, 1.0), modes.through), _missing(transfer, modes)
+    gain, T, alpha = lag
+    a, b0, b1, pair, through = tables(T, alpha, h, duration, 1.0)
+    missing = 1.0 - fractional_lag(T, alpha, h, duration).gain
     return gain, (a[0], b0[0], b1[0], pair[0], through), missing
 
 
@@ -297,32 +293,11 @@ def coefficients(terms: Polynomial) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _fractional(transfer: TransferFunction, h: float, duration: float) -> Modes:
-    """Its modes: the branch cut by the trapezoidal rule in ln ξ, the poles of the principal sheet by
-    residues. What is quicker than samples show passes at once."""
-    slow, quick = 1e-3 / duration, 30.0 / h
-    xi = np.exp(np.arange(np.log(slow), np.log(quick) + _QUICKER, _SPACING))
-    weights = -np.imag(transfer(xi * np.exp(1j * np.pi))) / np.pi * xi * _SPACING
-    seen = xi < quick
-    through = float(np.real(transfer(xi[-1:]))[0]) + float(np.sum(weights[~seen] / xi[~seen]))
-    rates, weights, pair = xi[seen], weights[seen], (-1.0 + 0j, 0j)
-    for pole in fractional_poles(transfer, slow, _FASTEST * quick):
-        residue = residue_at(transfer, pole)
-        if abs(pole) >= quick:
-            through -= float(np.real(residue / pole)) * (1 if pole.imag == 0 else 2)
-        elif pole.imag == 0:
-            rates, weights = np.append(rates, -pole.real), np.append(weights, residue.real)
-        else:
-            pair = complex(pole), complex(2 * residue)
-    return Modes(rates, weights, *pair, through)
-
-
-@lru_cache(maxsize=64)
 def _tables(
     transfer: TransferFunction, h: float, duration: float
 ) -> tuple[tuple[Array, Array, Array], Array, float]:
     """What the compiled loop needs of them: rows of the modes, the pair, and what passes at once."""
-    modes = _fractional(transfer, h, duration)
+    modes = modes_of(transfer, h, duration)
     *rows, pair = (np.array([row, row]) for row in speeded(modes, h, 1.0))
     a, past, now = rows
     return (a, past, now), pair, modes.through

@@ -12,7 +12,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -24,25 +24,42 @@ from focgen.rig.delay import delayed, shifted
 from focgen.rig.dynamics import UNCHANGED, Dynamics
 
 SPACING = 0.8  # Δ in ln ξ; the rule's own error is about exp(−π²/Δ) = 4e-6
+QUICK = 300.0  # of a sample: faster modes pass at once, which is off by their share over that
 _LARGEST = 300.0  # of an exponent
 _SLOW = 1e-4  # of a mode's decay over a sample: below, (e^q − 1)/q loses its digits
 
 
 @dataclass(frozen=True)
 class Modes:
-    """Rates (m,) in 1/s, weights (m,) in 1/s, the pair's pole and residue (1/s), and the instantaneous
-    share."""
+    """Rates (m,) in 1/s, weights (m,) in 1/s, the pair's pole and residue (1/s), the instantaneous share, and
+    pole and residue of every further pair. A residue is that of both poles of a pair."""
 
     rates: Array
     weights: Array
     pole: complex
     residue: complex
     through: float
+    others: tuple[tuple[complex, complex], ...] = ()
 
     @cached_property
     def gain(self) -> float:
         """Of what is held for as long as the slowest mode takes."""
-        return self.through + float(np.sum(self.weights / self.rates)) - (self.residue / self.pole).real
+        pairs = sum((residue / pole).real for pole, residue in ((self.pole, self.residue), *self.others))
+        return self.through + float(np.sum(self.weights / self.rates)) - pairs
+
+    @property
+    def in_one_row(self) -> Modes:
+        """With a lag in the place of every further pair, of its gain and its size: next to the branch cut,
+        where such pairs lie, they hardly swing."""
+        size = np.array([abs(pole) for pole, _ in self.others])
+        gain = np.array([-(residue / pole).real for pole, residue in self.others])
+        rates, weights = np.append(self.rates, size), np.append(self.weights, gain * size)
+        return replace(self, rates=rates, weights=weights, others=())
+
+    @property
+    def further(self) -> list[Modes]:
+        """Every further pair by itself."""
+        return [Modes(np.ones(1), np.zeros(1), *pair, 0.0) for pair in self.others]
 
 
 @lru_cache(maxsize=256)
@@ -50,13 +67,13 @@ def fractional_lag(T: float, alpha: float, h: float, duration: float) -> Modes:
     """The modes of 1/(T s^α + 1) for responses from ``h`` to ``duration`` seconds."""
     centre = -math.log(T) / alpha
     first = math.floor((math.log(1e-3 / duration) - centre) / SPACING)
-    last = max(math.ceil((math.log(30.0 / h) - centre) / SPACING), first + 2)
+    last = max(math.ceil((math.log(QUICK / h) - centre) / SPACING), first + 2)
     tail = math.ceil((math.log(1e6) / alpha) / SPACING) + 10  # far beyond the samples: acts at once
     x = centre + (np.arange(first, max(last, 0) + tail) + 0.5) * SPACING
     power = np.exp(alpha * (x - centre))  # T ξ^α
     density = power * (math.sin(alpha * math.pi) / math.pi)
     density /= 1 + power * (2 * math.cos(alpha * math.pi) + power)
-    seen = int(np.searchsorted(x, math.log(30.0 / h), side="right"))
+    seen = int(np.searchsorted(x, math.log(QUICK / h), side="right"))
     xi = np.exp(x[:seen])  # of the others, at low orders, no number is large enough
     weights = SPACING * xi * density[:seen]
     distance = math.pi * (1 - alpha) / alpha
@@ -139,7 +156,7 @@ def between(x: Array, rest: Bytes, h: float, modes: Modes, share: float) -> Arra
     a, past, now, twins = (np.stack([row, row]) for row in (*rows, _parts(pair)))
     kept = kernels.modes(x, rest, a, past, now, twins, 0.0, switching=False)
     made: Array = shifted(kept + before * x, rest, 1) + after * x
-    return made
+    return made + sum(between(x, rest, h, pair, share) for pair in modes.further)
 
 
 @lru_cache(maxsize=256)
@@ -162,6 +179,15 @@ def speeded(modes: Modes, h: float, speed: float) -> tuple[Array, Array, Array, 
     pa, p0, p1 = _held(modes.pole * speed * h)
     scale = -modes.residue / modes.pole
     return a, gain * b0, gain * b1, _parts([pa, scale * p0, scale * p1])
+
+
+def swings(x: Array, rest: Bytes, h: float, modes: Modes) -> Array | float:
+    """What the further pairs of ``modes`` make of ``x`` (n,)."""
+    made: Array | float = 0.0
+    for pair in modes.further:
+        a, b0, b1, both = (np.stack([row, row]) for row in speeded(pair, h, 1.0))
+        made = made + kernels.modes(x, rest, a, b0, b1, both, 0.0, switching=False)
+    return made
 
 
 def _held(q: complex) -> tuple[complex, complex, complex]:

@@ -9,11 +9,11 @@ import numpy as np
 from focgen.arrays import Array
 from focgen.errors import RigError
 from focgen.fractional.decomposition import dense
+from focgen.fractional.poles import first_sheet_zeros
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import Run
 from focgen.rig.engine import Chain
-from focgen.rig.poles import fractional_poles
 from focgen.rig.rig import LinearActuator, Rig
 
 _GROWN = 25.0  # time constants that a pole may grow for: beyond, what it makes is no signal of a rig
@@ -60,21 +60,25 @@ def longest(logs: Sequence[Experiment]) -> float:
 
 def check_bounded(rig: Rig, seconds: float) -> None:
     """Raises RigError where a stage of the nominal rig grows by itself, by more than e²⁵ in so many
-    ``seconds``: run for so long it would leave all numbers."""
+    ``seconds``: run for so long it would leave all numbers. And where its poles cannot be located."""
     stages = {"regulator": rig.regulator, "sensor": rig.sensor}
     if isinstance(rig.actuator, LinearActuator):
         stages["actuator"] = rig.actuator.dynamics
     for name, transfer in stages.items():
-        rate = _growth(transfer, rig.sample_time, seconds)
+        where = f"{rig.name} [{name}]"
+        try:
+            rate = _growth(transfer)
+        except ArithmeticError as reason:
+            remedy = "check the coefficients and orders of its den"
+            raise RigError(where, f"its poles cannot be located: {reason}", remedy) from None
         if rate * seconds > _GROWN:
             what = f"grows by itself, by a factor of e every {1.0 / rate:.3g} s"
-            raise RigError(f"{rig.name} [{name}]", what, "check the signs and orders of its den")
+            raise RigError(where, what, "check the signs and orders of its den")
 
 
-def _growth(transfer: TransferFunction, h: float, seconds: float) -> float:
-    """The largest real part of a pole, 1/s, that shows in so many seconds; 0 where none is positive."""
-    if transfer.is_integer:
-        poles = list(np.roots(dense(transfer.den)))
-    else:
-        poles = fractional_poles(transfer, 1e-3 / seconds, 30.0 / h)
+def _growth(transfer: TransferFunction) -> float:
+    """The largest real part of a pole, 1/s; 0 where there is none. Raises ArithmeticError where the poles
+    cannot be located."""
+    whole = transfer.is_integer
+    poles = np.roots(dense(transfer.den)) if whole else first_sheet_zeros(transfer.den, 0.5 * np.pi)
     return max((float(pole.real) for pole in poles), default=0.0)
