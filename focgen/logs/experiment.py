@@ -27,7 +27,7 @@ class Experiment:
     ``begins``: by role, what a signal was before the first sample; others were at rest at 0. ``anew``:
     ahead of it the log's clock fell back. ``paused``: how long the rig rested before it is not known, and
     ``start`` is as if no time had passed. ``lasts``: a loop or a play lies where the experiment before left
-    it, and not at 0. ``stands``: where an actuator that integrates stood as it began, in its output's unit.
+    it, and not at 0. ``stands``: where a stage that integrates stood as it began, in its output's unit.
     ``readings``: by role, the rows that hold one, where a logger filled in the others.
     """
 

@@ -39,7 +39,7 @@ def with_past(x: Array, run: Run) -> Array:
 
 
 def from_there(x: Array, run: Run) -> Array:
-    """What leaves an actuator that integrates (n,), ``x`` had it stood at 0 as each experiment began."""
+    """What leaves a stage that integrates (n,), ``x`` had it stood at 0 as each experiment began."""
     made: Array = x + np.repeat(run.stands, [b - a for a, b in run.spans])
     return made
 

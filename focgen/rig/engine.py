@@ -121,7 +121,7 @@ class Chain:
                 if left is not None and placed is not None:
                     left[_index(self.placed, placed)] = placed.leaves(x, run)
                 x = self._once((stage, number), key, x, act, run)
-            if stage == "actuator" and run.stands:
+            if run.stands and stage == self.rig.integrator:
                 x, run = self._once("stood", run.stands, x, from_there, run), run.stood
             if tap is not None:
                 tap[stage] = x

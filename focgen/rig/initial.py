@@ -26,7 +26,7 @@ from focgen.rig.carried import FIRST, carried, stretched
 from focgen.rig.effects import Run
 from focgen.rig.engine import Chain, Placed, between_of
 from focgen.rig.response import response_time
-from focgen.rig.rig import LinearActuator, Rig
+from focgen.rig.rig import UNITY, LinearActuator, Rig
 from focgen.rig.stages import ENTERS, LEAVES, STAGES
 from focgen.rig.stood import standing
 
@@ -80,16 +80,38 @@ def begun(rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] = ()) -
     """The experiments, each with what every signal that enters a stage was before, where the data ask for
     it.
 
-    ``placed``: effects in the rig. A rig that integrates has no equilibrium to begin from: of its experiments
-    is told where they stood.
+    ``placed``: effects in the rig. What integrates has no equilibrium to begin from: of a rig that does is
+    told where it stood, and, behind a regulator that does, what the stages there came from.
     """
     if not all(map(len, logs)):
         return tuple(logs)
     if any(not np.isfinite(gain) for gain in _gains(rig)):
+        behind = replace(rig, regulator=UNITY)
+        if rig.integrator == "regulator" and all(map(np.isfinite, _gains(behind))):
+            logs = _driven(rig, behind, logs, placed)
         return tuple(standing(rig, log, placed, NOTE) for log in logs)
+    return _told(rig, logs, placed, tuple(ENTERS))
+
+
+def _driven(
+    rig: Rig, behind: Rig, logs: Sequence[Experiment], placed: Sequence[Placed]
+) -> tuple[Experiment, ...]:
+    """The experiments of a regulator that integrates, with what its command was, which may move it as a log
+    begins, and what entered the stages ``behind`` it."""
+    moved = _told(rig, logs, placed, ("command",))
+    others = [p for p in placed if p.stage != "regulator"]
+    came = _told(behind, logs, others, ("pressure", "curvature"))
+    return tuple(replace(b, begins={**a.begins, **b.begins}) for a, b in zip(moved, came))
+
+
+def _told(
+    rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed], entries: Sequence[str]
+) -> tuple[Experiment, ...]:
+    """The experiments with what the signals were before that enter a stage, those of the ``entries`` that are
+    logged."""
     scales = _Scales.of(rig, logs)
-    entries = [role for role in ENTERS if role in scales.sizes and scales.behind(role)]
-    return tuple(_begun(rig, log, placed, entries, scales) for log in logs)
+    logged = [role for role in entries if role in scales.sizes and scales.behind(role)]
+    return tuple(_begun(rig, log, placed, logged, scales) for log in logs)
 
 
 @dataclass(frozen=True)

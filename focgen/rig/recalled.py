@@ -24,9 +24,10 @@ from focgen.logs.experiment import Experiment
 from focgen.rig.engine import Chain, Placed, between_of
 from focgen.rig.initial import NOTE as ESTIMATED
 from focgen.rig.response import integrations, longest, response_time
-from focgen.rig.rig import LinearActuator, Rig
+from focgen.rig.rig import Rig
 from focgen.rig.session import joined, run_of
 from focgen.rig.stages import ENTERS, LEAVES, STAGES
+from focgen.rig.stood import standing
 
 NOTE = "begins before the rig has come to rest: the experiments before are simulated ahead of it"
 _RECALLED = 0.98  # of the mean square that is left without: more is no sign that the rig remembers
@@ -91,23 +92,24 @@ def recalled(
     rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] = (), closer: bool = True
 ) -> tuple[Experiment, ...]:
     """The experiments, each that begins with an input of 0, or goes on from the last, with what the earlier
-    ones put in; as they are where that would not show, or come no ``closer``, or in a rig that integrates."""
-    if len(logs) < 2 or not all(map(len, logs)) or integrations(rig) or _integrates(rig):
+    ones put in; as they are where that would not show, or come no ``closer``, or in a rig whose actuator or
+    sensor integrates."""
+    once = rig.integrator == "regulator" and integrations(rig) == 1
+    if len(logs) < 2 or not all(map(len, logs)) or ((integrations(rig) or rig.integrator) and not once):
         return tuple(logs)
     past = memory(rig, logs)
     found = tuple(
         _recalled(log, [other for other in logs if ended(other) <= log.start], past) for log in logs
     )
+    if rig.integrator:  # what was put in tells where a pump stood but for what errors add up to
+        found = tuple(standing(rig, log, placed, ESTIMATED) for log in found)
     return found if _shows(rig, placed, logs, found, closer) else tuple(logs)
 
 
-def _integrates(rig: Rig) -> bool:
-    """Whether the actuator does, whatever its sensor makes of it."""
-    return isinstance(rig.actuator, LinearActuator) and rig.actuator.integrates
-
-
 def memory(rig: Rig, logs: Sequence[Experiment]) -> float:
-    """How long ago, s, an input counts as 0."""
+    """How long ago, s, an input counts as 0: never, of a regulator that adds it up."""
+    if rig.integrator:
+        return np.inf
     return _LONGEST * response_time(rig, logs[0].sample_time, longest(logs))
 
 

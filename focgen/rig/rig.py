@@ -170,3 +170,12 @@ class Rig:
     delays: Delays = Delays()
     uncertainty: Uncertainty = Uncertainty()
     between: Between | None = None
+
+    @property
+    def integrator(self) -> str | None:
+        """The first stage that goes on under a constant input, as a pump's volume or an axis does; None where
+        there is none, or only the sensor."""
+        if not math.isfinite(self.regulator.dc_gain):
+            return "regulator"
+        moves = isinstance(self.actuator, LinearActuator) and self.actuator.integrates
+        return "actuator" if moves else None

@@ -80,7 +80,7 @@ class Run:
     ``duration`` of the longest experiment in s; ``carried``: what of an effect outlived an earlier session.
     ``begins``: what the input was before each experiment, in its order; none where all come from rest.
     ``lasts``: what remembers lies, as an experiment begins at rest, where its last turn left it.
-    ``stands``: where an actuator that integrates stood as each began; none where it was at 0 in all.
+    ``stands``: where a stage that integrates stood as each began; none where it was at 0 in all.
     ``rough``: what is integrated in steps may take them twice as long, for fits that are but compared.
     """
 
@@ -104,7 +104,7 @@ class Run:
 
     @cached_property
     def stood(self) -> Run:
-        """The run behind an actuator that integrates, at rest where that stood as each experiment began."""
+        """The run behind a stage that integrates, at rest where that stood as each experiment began."""
         rest = self.rest.copy()
         firsts = np.flatnonzero(rest)
         rest[firsts[np.array(self.stands) != 0.0]] = 2

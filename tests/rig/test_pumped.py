@@ -1,0 +1,104 @@
+"""Regulators that add up what they are told: a syringe pump, a stepper. They stay where they were left.
+
+Red when a log that begins with some volume in the bladder, at rest or on its way, is taken for one that
+begins empty, or when an earlier log's strokes are not put ahead of the next.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from focgen.fractional.transfer import TransferFunction
+from focgen.logs.experiment import Experiment
+from focgen.rig.effects import Run
+from focgen.rig.engine import Chain
+from focgen.rig.initial import NOTE, begun
+from focgen.rig.recalled import with_recalled
+from focgen.rig.replay import simulate_session
+from focgen.rig.rig import Actuator, LinearActuator, Rig, Signals
+from focgen.rig.stages import LEAVES
+
+H = 0.05
+PUMP = TransferFunction([(0.95, 0.0)], [(0.08, 2.0), (1.0, 1.0)])
+SENSOR = TransferFunction([(0.35, 0.0)], [(0.1, 1.0), (1.0, 0.0)])
+LINEAR = LinearActuator(TransferFunction([(0.9, 0.0)], [(0.2, 2.0), (1.0, 1.0), (1.0, 0.0)]))
+RIGS = {
+    "fractional": Rig("bladder", H, Signals("t", "c"), Actuator(1.2, 0.6, (0.86, 0.015)), PUMP, SENSOR),
+    "whole": Rig("bladder", H, Signals("t", "c"), LINEAR, PUMP, SENSOR),
+}
+SETS = {"C": ("pressure", "curvature", "output"), "B": ("pressure", "output"), "A": ("output",)}
+FLOW = np.concatenate(
+    [np.full(n, q) for n, q in [(40, 0), (60, 5), (300, 0), (30, -5), (80, 0), (50, 4), (300, 0)]]
+)
+
+
+def logged(rig, roles, flow=FLOW, noise=0.002, seed=1, empty=True):
+    """A session of one log that begins empty, a tenth of what the gauges show off by noise."""
+    tap: dict = {}
+    run = Run.of([len(flow)], [0.0], H)
+    Chain(rig).run(np.asarray(flow, float), "regulator", "sensor", run, tap=tap)
+    rng = np.random.default_rng(seed)
+    made = {LEAVES[stage]: y for stage, y in tap.items()}
+    signals = {r: made[r] + noise * np.ptp(made[r]) * rng.standard_normal(len(flow)) for r in roles}
+    return Experiment("log1", H, {"command": np.asarray(flow, float), **signals}), made
+
+
+def cut(log, first, last=None, name="log1"):
+    """The log from its sample ``first`` on, by a clock of its own."""
+    signals = {role: np.asarray(log[role])[first:last] for role in log.signals}
+    return replace(log, name=name, signals=signals, start=0.0)
+
+
+def left(rig, session):
+    """The largest that is left of an output, over its range."""
+    made = simulate_session(rig, session)
+    off = [
+        np.max(np.abs(m["output"] - log["output"])) / np.ptp(log["output"]) for m, log in zip(made, session)
+    ]
+    return max(off)
+
+
+@pytest.mark.parametrize("roles", SETS.values(), ids=SETS)
+@pytest.mark.parametrize("rig", RIGS.values(), ids=RIGS)
+def test_a_bladder_is_as_full_as_it_was_left(rig, roles):
+    """By where it stood, or by a stroke that put it there, whichever the creep behind it shows."""
+    whole, made = logged(rig, roles)
+    log = cut(whole, 390)  # at rest since the first stroke
+    found = begun(rig, [log])
+    assert simulate_session(rig, found)[0]["pressure"][0] == pytest.approx(made["pressure"][390], rel=0.06)
+    assert NOTE in found[0].notes
+    assert left(rig, found) < 0.05 < 0.4 < left(rig, [log])
+
+
+@pytest.mark.parametrize("roles", SETS.values(), ids=SETS)
+@pytest.mark.parametrize("first", [75, 405, 490])
+def test_a_pump_may_be_on_its_way_as_a_log_begins(roles, first):
+    """Filling from empty, venting, and filling from half; of strokes longer ago the silicone creeps on."""
+    rig = RIGS["fractional"]
+    log = cut(logged(rig, roles)[0], first)
+    assert left(rig, begun(rig, [log])) < 0.15 * left(rig, [log])
+
+
+@pytest.mark.parametrize("roles", SETS.values(), ids=SETS)
+def test_a_bladder_that_begins_empty_stands_at_0(roles):
+    for seed in range(10):
+        log, _ = logged(RIGS["fractional"], roles, noise=0.01, seed=seed)
+        assert begun(RIGS["fractional"], [log])[0].stands == 0.0
+
+
+def test_strokes_of_an_earlier_log_are_ahead_of_the_next():
+    """A bladder that goes on creeping from many strokes, in a log without one at first."""
+    rig = RIGS["fractional"]
+    strokes = np.concatenate([np.zeros(20), np.repeat([6, -4, 5, -6, 3, -2.5], 25), np.zeros(20)])
+    whole, _ = logged(rig, SETS["A"], np.concatenate([strokes, FLOW]), noise=0.001)
+    session = [cut(whole, 0, 170), replace(cut(whole, 190, None, "log2"), start=190 * H)]
+    told = begun(rig, session)
+
+    def cost(of):
+        pairs = zip(simulate_session(rig, of), of)
+        return sum(float(np.mean((made["output"] - log["output"]) ** 2)) for made, log in pairs)
+
+    recalled = with_recalled(rig, told, cost)
+    assert recalled[1].before("command").known
+    assert cost(recalled) < 0.3 * cost(told)
