@@ -29,6 +29,7 @@ from focgen.rig.response import response_time
 from focgen.rig.rig import UNITY, LinearActuator, Rig
 from focgen.rig.stages import ENTERS, LEAVES, STAGES
 from focgen.rig.stood import standing
+from focgen.rig.tried import Try, likeliest
 
 NOTE = "begins away from rest: the state that it starts from is estimated"
 _ROLES = ("command", "pressure", "curvature", "output")
@@ -170,27 +171,6 @@ def _gains(rig: Rig) -> list[float]:
     return [rig.regulator.dc_gain, *actuator, rig.sensor.dc_gain]
 
 
-@dataclass(frozen=True, eq=False)
-class _Try:
-    """A begin with so many ``free`` numbers, and what it leaves (n, signals) of the signals, in shares of
-    their largest magnitude: ``raw``, and ``left`` less an offset, the later the less it counts."""
-
-    begin: Begin
-    free: int
-    raw: Array
-    left: Array
-
-    @property
-    def cost(self) -> float:
-        return float(np.sum(self.left**2))
-
-    @property
-    def first(self) -> Array:
-        """How far the first samples are off (signals,)."""
-        made: Array = np.abs(self.raw[:FIRST].mean(axis=0))
-        return made
-
-
 class _Setting:
     """One experiment, the rig, and what is measured behind the ``entry``."""
 
@@ -228,10 +208,10 @@ class _Setting:
         moved = np.abs(self.x - self.level) > _NOTHING * self.reach
         return int(np.argmax(moved)) if moved.any() else self.n
 
-    def at(self, begin: Begin, free: int) -> _Try:
+    def at(self, begin: Begin, free: int) -> Try:
         """What a begin leaves, ``free`` numbers of which are fitted."""
         raw = self._missed(begin)
-        return _Try(begin, free, raw, self._counted(raw, np.minimum(self.asked.offset, self.borne)))
+        return Try(begin, free, raw, self._counted(raw, np.minimum(self.asked.offset, self.borne)))
 
     def _missed(self, begin: Begin) -> Array:
         """What is measured less what a begin makes (n, signals)."""
@@ -255,7 +235,7 @@ class _Setting:
         made: Array = (raw - np.clip(mean, -offset, offset)) * self.counts
         return made
 
-    def told_by(self, ahead: str, begin: Begin) -> Iterator[_Try]:
+    def told_by(self, ahead: str, begin: Begin) -> Iterator[Try]:
         """The past that the signal ``ahead`` makes of the input, where that one's is ``begin``: as it is, and
         so many times as far from where the log begins as suits best."""
         leaves = STAGES[STAGES.index(ENTERS[self.entry]) - 1]
@@ -265,7 +245,7 @@ class _Setting:
         yield base
         yield self.at(stretched(base.begin, float(np.clip(times, *_TIMES_AS_FAR))), 1)
 
-    def chosen(self, further: Sequence[_Try] = ()) -> Begin:
+    def chosen(self, further: Sequence[Try] = ()) -> Begin:
         """The begin that the data ask for, of all kinds and the ``further`` ones."""
         rest, asked = self.at(REST, 0), self.asked
         noise = np.array([_white(y) for y in self.y.T])
@@ -273,7 +253,7 @@ class _Setting:
         if not moved.any():
             return self._kept(rest)
 
-        def off(t: _Try) -> float:
+        def off(t: Try) -> float:
             return float(np.linalg.norm(t.first[moved]) / np.linalg.norm(rest.first[moved]))
 
         most = asked.cost * rest.cost
@@ -283,9 +263,9 @@ class _Setting:
         sure = np.max(rest.first) > asked.far and min(map(off, tries)) < asked.surely
         if sure and self._offset_explains(rest, tries):
             return REST
-        return _likeliest(tries if sure else [rest, *tries], asked.nats).begin
+        return likeliest(tries if sure else [rest, *tries], asked.nats).begin
 
-    def _kept(self, rest: _Try) -> Begin:
+    def _kept(self, rest: Try) -> Begin:
         """The first level held for ever where a log begins near rest: a valve that sticks keeps a little in
         the rig. The rig has to be found where that level holds it: what is off otherwise stays so."""
         least = _APART * _white(self.x) / np.sqrt(FIRST)
@@ -294,16 +274,16 @@ class _Setting:
         held = self.at(Begin((self.level,)), 0)
         if np.linalg.norm(held.first) > self.asked.mended * np.linalg.norm(rest.first):
             return REST
-        return _likeliest([rest, held], self.asked.nats).begin
+        return likeliest([rest, held], self.asked.nats).begin
 
-    def _offset_explains(self, rest: _Try, tries: Sequence[_Try]) -> bool:
+    def _offset_explains(self, rest: Try, tries: Sequence[Try]) -> bool:
         """Whether a rest, with an offset of any size, is much better than any past without one."""
         left = self._counted(rest.raw, np.inf)
         return _OFFSET * float(np.sum(left**2)) < min(t.cost for t in tries)
 
     # -- candidates, from the simplest on -------------------------------------------------------------------
 
-    def tries(self) -> list[_Try]:
+    def tries(self) -> list[Try]:
         """The best of each kind of begin but a rest."""
         held = self.at(Begin((self.level,)), 0)
         times = np.log(np.geomspace(_SOONEST * self.h, self.longest, _TIMES))
@@ -313,7 +293,7 @@ class _Setting:
         two = self._descended(self._two_start(times, from_level.begin), self._twice)
         return [held, one, from_level, two]
 
-    def _one_start(self, times: Array, stepped: Sequence[_Try]) -> Array:
+    def _one_start(self, times: Array, stepped: Sequence[Try]) -> Array:
         """Where to begin to look for a step from a level: the time and the level that leave least.
 
         A step from rest does not tell the time: where the input is near 0 at first, that is nothing.
@@ -336,7 +316,7 @@ class _Setting:
 
     def _asking(
         self,
-        base: _Try,
+        base: Try,
         begin: Callable[[Array], Begin],
         ahead: Sequence[float],
         behind: Sequence[float] = (),
@@ -359,7 +339,7 @@ class _Setting:
         late, early = float(np.exp(x[0])), float(np.exp(max(x[2], x[0])))
         return Begin((0.0, float(x[1]) * self.reach, self.level), (early, late))
 
-    def _descended(self, start: Sequence[float] | Array, begin: Callable[[Array], Begin]) -> _Try:
+    def _descended(self, start: Sequence[float] | Array, begin: Callable[[Array], Begin]) -> Try:
         """Gauss-Newton on log times and levels, damped where it fails."""
         low, high = self._bounds(len(start))
         x: Array = np.clip(np.array(start, float), low, high)
@@ -391,28 +371,6 @@ def _step(slope: Array, left: Array, damping: float) -> Array:
     weight = damping * np.diag(normal) + 1e-9 * np.trace(normal) + 1e-300
     made: Array = np.clip(np.linalg.solve(normal + np.diag(weight), slope.T @ left), -1.0, 1.0)
     return made
-
-
-def _likeliest(tries: Sequence[_Try], nats: float) -> _Try:
-    """The try of highest evidence (Schwarz's criterion); any but a rest needs so many more."""
-    count = _effective(min(tries, key=lambda t: t.cost).left)
-
-    def criterion(t: _Try) -> float:
-        asked = t.free * np.log(count) + (not t.begin.at_rest) * nats
-        return float(count * np.log(max(t.cost, 1e-300)) + asked)
-
-    return min(tries, key=criterion)
-
-
-def _effective(left: Array) -> float:
-    """How many samples a residual (n, signals) is worth, by its correlation from one to the next."""
-    count = 0.0
-    for part in left.T:
-        part = part - part.mean()
-        size = float(part @ part)
-        rho = float(part[1:] @ part[:-1]) / size if size else 0.0
-        count += len(part) * (1.0 - rho) / (1.0 + rho)
-    return max(count, 2.0)
 
 
 def _white(y: Array) -> float:

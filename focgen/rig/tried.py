@@ -1,0 +1,56 @@
+"""A try of what an input was before an experiment, and which of several the data ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from focgen.arrays import Array
+from focgen.logs.begin import Begin
+from focgen.rig.carried import FIRST
+
+
+@dataclass(frozen=True, eq=False)
+class Try:
+    """A begin with so many ``free`` numbers, and what it leaves (n, signals) of the signals, in shares of
+    their largest magnitude: ``raw``, and ``left`` less an offset, the later the less it counts."""
+
+    begin: Begin
+    free: int
+    raw: Array
+    left: Array
+
+    @property
+    def cost(self) -> float:
+        """The sum of the squares that are left."""
+        return float(np.sum(self.left**2))
+
+    @property
+    def first(self) -> Array:
+        """How far the first samples are off (signals,)."""
+        made: Array = np.abs(self.raw[:FIRST].mean(axis=0))
+        return made
+
+
+def likeliest(tries: Sequence[Try], nats: float) -> Try:
+    """The try of highest evidence (Schwarz's criterion); any but a rest needs so many ``nats`` more."""
+    count = _effective(min(tries, key=lambda t: t.cost).left)
+
+    def criterion(t: Try) -> float:
+        asked = t.free * np.log(count) + (not t.begin.at_rest) * nats
+        return float(count * np.log(max(t.cost, 1e-300)) + asked)
+
+    return min(tries, key=criterion)
+
+
+def _effective(left: Array) -> float:
+    """How many samples a residual (n, signals) is worth, by its correlation from one to the next."""
+    count = 0.0
+    for part in left.T:
+        part = part - part.mean()
+        size = float(part @ part)
+        rho = float(part[1:] @ part[:-1]) / size if size else 0.0
+        count += len(part) * (1.0 - rho) / (1.0 + rho)
+    return max(count, 2.0)
