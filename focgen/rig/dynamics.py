@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -113,11 +114,23 @@ class Throat:
 
 @dataclass(frozen=True)
 class Pace:
-    """How many times as slow a stage is: exp(``rate``) at its highest level, at the session's end or at its
-    greatest speed, by ``by``, which is ``level``, ``time`` or ``speed``; and 1 at none."""
+    """How many times as slow a stage is: exp(``rate`` q + ``curve`` q²), where q is 1 at its highest level, at
+    the session's end or at its greatest speed, by ``by``, which is ``level``, ``time`` or ``speed``, and 0 at
+    none."""
 
     by: str = "level"
     rate: float = 0.0
+    curve: float = 0.0
+
+    def slowness(self, q: Any) -> Any:
+        """So many times, any shape."""
+        return np.exp((self.rate + self.curve * q) * q)
+
+    @property
+    def fastest(self) -> float:
+        """The least of it from 0 to 1, and so 1 at most."""
+        turn = -0.5 * self.rate / self.curve if self.curve else 0.0
+        return float(np.min(self.slowness(np.array([0.0, 1.0, min(max(turn, 0.0), 1.0)]))))
 
 
 STRAIGHT, NO_FRICTION, LINEAR, LEVEL, EVEN = Bend(), Friction(), Spring(), Rise(), Power()

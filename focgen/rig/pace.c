@@ -1,8 +1,8 @@
 /* Stages gain/(1 + Q) whose pace is not even: (1 + s Q) y = gain x, and s, how many times as slow the stage is at a sample, depends on
  * the response itself, on how fast it goes, or on time. With `fast` no more than s, (1 + fast Q) y = gain v of v = x w + y/gain (1 - w),
  * w = fast/s: the stage is run at an even pace, and what enters it is solved for at every sample.
- * `pace` = {gain, fast, rate, scale}: s is exp(rate q), q = y/(gain scale) BY_LEVEL, -1 ... 1, and |x - y/gain|/scale BY_SPEED, 1 at
- * most; otherwise `share` has w at every sample.
+ * `pace` = {gain, fast, rate, scale, curve}: s is exp(rate q + curve q^2), q = y/(gain scale) BY_LEVEL, -1 ... 1, and
+ * |x - y/gain|/scale BY_SPEED, 1 at most; otherwise `share` has w at every sample.
  * `rest` is as in kernels.c.
  */
 #include <math.h>
@@ -16,7 +16,8 @@ static const double CLOSE = 1e-7;
 static double part(int by, const double *pace, double x, double y)
 {
     double now = y / pace[0], q = by == BY_LEVEL ? now / pace[3] : fabs(x - now) / pace[3];
-    return pace[1] * exp(-pace[2] * (q > 1.0 ? 1.0 : q < -1.0 ? -1.0 : q));
+    q = q > 1.0 ? 1.0 : q < -1.0 ? -1.0 : q;
+    return pace[1] * exp(-(pace[2] + pace[4] * q) * q);
 }
 
 /* y = still + first x w + second y/gain (1 - w), from the response before: `w` is left as it is there. */

@@ -27,14 +27,14 @@ def run(
     With (1 + m Q) y = x and m no less than f, (1 + f Q) y = x f/m + y (1 − f/m): of that y is solved for at
     every sample. The part that x has may jump between samples, that of y runs in lines.
     """
-    fastest = float(np.exp(min(pace.rate, 0.0)))
+    fastest = pace.fastest
     scale, share = 1.0, np.empty(0)
     if pace.by == "time":
-        share = fastest / np.exp(pace.rate * _moment(run))
+        share = fastest / pace.slowness(_moment(run))
     else:
         even = linear.run(transfer, x, run.rest, run.h, run.duration, between) / transfer.dc_gain
         scale = float(np.max(np.abs(even if pace.by == "level" else x - even))) or 1.0
-    slowness = _BY[pace.by], (transfer.dc_gain, fastest, pace.rate, scale), share
+    slowness = _BY[pace.by], (transfer.dc_gain, fastest, pace.rate, scale, pace.curve), share
     y = solved.run_paced(_at(transfer, fastest), x, run.rest, run.h, run.duration, between, slowness)
     return delayed(y, run.rest, run.h, delay) if delay else y
 

@@ -11,7 +11,8 @@ from focgen.rig.dynamics import Dynamics, Pace
 from focgen.rig.effects import EQUATIONS, Form, Parameter
 
 UNEVEN = "uneven_pace"
-_RATE = Parameter("rate", lower=-1.5, upper=1.5, starts=(0.3, -0.3), zero=0.0)
+_RATE = Parameter("rate", lower=-2.5, upper=2.5, starts=(0.3, -0.3), zero=0.0)
+_CURVE = Parameter("curve", lower=-2.5, upper=2.5, starts=(0.0,), zero=0.0)
 
 
 def uneven_paces(problem: Problem) -> list[CandidateEffect]:
@@ -28,16 +29,16 @@ def uneven_paces(problem: Problem) -> list[CandidateEffect]:
 
 def _forms(slot: str) -> list[Form]:
     """A regulator that is the slower the faster it goes is one whose flow is limited, and an effect."""
-    quicker = replace(_RATE, upper=0.0, starts=(-0.3,))
+    quicker = replace(_RATE, upper=0.0, starts=(-0.3,)), replace(_CURVE, upper=0.0)
     return [
-        _form("level", slot, _RATE),
-        _form("time", slot, _RATE),
-        _form("speed", slot, quicker if slot == EQUATIONS["regulator"] else _RATE),
+        _form("level", slot, _RATE, _CURVE),
+        _form("time", slot, _RATE, _CURVE),
+        _form("speed", slot, *(quicker if slot == EQUATIONS["regulator"] else (_RATE, _CURVE))),
     ]
 
 
-def _form(by: str, slot: str, rate: Parameter) -> Form:
+def _form(by: str, slot: str, *parameters: Parameter) -> Form:
     def act(x: Dynamics, values: tuple[float, ...], run: None) -> Dynamics:
-        return replace(x, pace=Pace(by, values[0]))
+        return replace(x, pace=Pace(by, *values))
 
-    return Form(by, slot, (rate,), act)
+    return Form(by, slot, parameters, act)

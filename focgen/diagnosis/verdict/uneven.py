@@ -68,5 +68,5 @@ def _judged(e: Explanation, base: Fit) -> Uneven | None:
     weighing = Weighing(e.ar)
     best = fit(first.problem, first.vector, weighing, _ITERATIONS, leader=e.best)
     odds = odds_over(e, base, square_by(best, weighing), best.size - base.size)
-    pace, (rate,) = best.problem.candidates[-1], best.problem.values(best.vector)[-1]
-    return Uneven(gone(e, base), odds, pace.stage, pace.form.name, float(np.exp(rate)))
+    pace, (rate, curve) = best.problem.candidates[-1], best.problem.values(best.vector)[-1]
+    return Uneven(gone(e, base), odds, pace.stage, pace.form.name, float(np.exp(rate + curve)))
