@@ -114,9 +114,9 @@ class Throat:
 
 @dataclass(frozen=True)
 class Pace:
-    """How many times as slow a stage is: exp(``rate`` q + ``curve`` q²), where q is 1 at its highest level, at
-    the session's end or at its greatest speed, by ``by``, which is ``level``, ``time`` or ``speed``, and 0 at
-    none."""
+    """How many times as slow a stage is: exp(``rate`` q + ``curve`` q²), where q is 1 at its highest level,
+    at the session's end or at its greatest speed, by ``by``, which is ``level``, ``time`` or ``speed``, and 0
+    at none."""
 
     by: str = "level"
     rate: float = 0.0
