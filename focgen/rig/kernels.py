@@ -246,7 +246,7 @@ def bent_rational(x: Array, rest: Bytes, b: Array, c: Array, a: Array, spring: S
 
 
 Slowness = tuple[int, Sequence[float], Array]
-"""What an uneven pace depends on, {gain, fast, rate, scale, curve}, and the share (n,) of time: ``pace.c``."""
+"""What an uneven pace depends on, {gain, fast, rate, scale, curve}, and the share (n,) of time: pace.c."""
 
 
 def paced_modes(
