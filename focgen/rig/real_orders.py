@@ -10,7 +10,7 @@ sheets (residue theorem, with the kernel π cot(π (x − x₀)/Δ)). Far inside
 from __future__ import annotations
 
 import math
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -123,14 +123,20 @@ def _about_zero(transfer: TransferFunction, first: float, weights: Array) -> tup
     the first moments, (1/2πi) ∮ H s^k ds, of its circle. The rule's end at the first of its ``weights`` (m,)
     is in them."""
     radius = math.exp(first)
-    nodes, counts = np.polynomial.legendre.leggauss(_AROUND)
-    turned = np.exp(1j * math.pi * nodes)
+    turned, counts = _circle()
     values = counts * transfer(radius * turned) * turned
     power, each = _power(transfer, first), np.arange(len(_RATES))
     moments = np.array([0.5 * radius * float(np.real(np.sum(values * turned**k))) for k in each])
     moments += weights[0] * (-1.0) ** each * _end(_SPACING * (power + each))
     rates = np.array(_RATES)
     return radius * rates, np.linalg.solve(np.vander(-rates, increasing=True).T, moments)
+
+
+@cache
+def _circle() -> tuple[Complex, Array]:
+    """Places on the circle of radius 1, from cut to cut, and their weights (Gauss and Legendre)."""
+    nodes, counts = np.polynomial.legendre.leggauss(_AROUND)
+    return np.exp(1j * math.pi * nodes), counts
 
 
 def _power(transfer: TransferFunction, x: float) -> float:
