@@ -305,6 +305,24 @@ def test_a_colour_goes_with_the_effects_that_it_was_made_with(monkeypatch, first
     assert (weighing is WHITE) == (judged == "white")
 
 
+def test_what_changes_nothing_tells_nothing_of_a_chain_that_is_off():
+    """An obstacle out of reach, sure not to be there, made a drift beside it impossible: 4e-16."""
+    drift, obstacle = 8.3, -8.2
+    alone = probabilities([drift], [-2.2])
+    beside = probabilities([drift, obstacle], [-2.2, nominal_off(1e-9, True)])
+    assert alone[0] > 0.8
+    assert beside[0] == pytest.approx(alone[0], abs=1e-6)
+
+
+def test_what_is_likelier_not_there_is_not_named_beside_an_effect(monkeypatch):
+    monkeypatch.setattr(nominal, "is_unknown", lambda e: False)
+    gone, clear = (
+        SimpleNamespace(rivals=[_rival("contact", odds, 9.0 * NUMBERS.bent)]) for odds in (-3.0, 30.0)
+    )
+    found = likelier_nominal([SimpleNamespace(causes=(gone, clear), unknown=False)])
+    assert [c for _, c in found] == [gone]
+
+
 def test_beside_an_effect_what_is_likelier_the_nominal_chain_is_not_named(monkeypatch):
     """Alone it stays, for it is all there is to say; of several the surest stays."""
     monkeypatch.setattr(nominal, "is_unknown", lambda e: e.unknown)

@@ -4,11 +4,14 @@ Red when a parameter is written in another unit than its form works in.
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from focgen.control.units import units_of_rig
-from focgen.diagnosis.verdict.sizes import unit_of_parameter
+from focgen.diagnosis.problem.problem import CandidateEffect
+from focgen.diagnosis.verdict.sizes import at_their_ends, unit_of_parameter
 from focgen.fractional import TransferFunction
 from focgen.rig.effects import form_of, library
 from focgen.rig.engine import slot_in
@@ -75,3 +78,24 @@ def test_signals_without_a_column_borrow_a_unit_only_where_nothing_lies_between(
     assert unit("hysteresis", "play", "width", bare) == "curvature unit"  # the sensor reads 3 mV a unit
     plain = replace(bare, sensor=TransferFunction([(1.0, 0.0)], [(0.1, 1.0), (1.0, 0.0)]))
     assert units_of_rig(plain)["curvature"] == "mV"
+
+
+@pytest.mark.parametrize(
+    "values, ended",
+    [
+        ((0.1, 0.4), ("recovering_speed",)),  # ten times as slow: as slow as is looked for
+        ((0.11, 0.4), ()),
+        ((0.5, 3.0), ("share",)),
+        ((0.5, 0.0), ()),  # nothing of it is no end
+    ],
+)
+def test_a_number_at_the_end_of_where_it_is_looked_for_is_said(values, ended):
+    """A centripetal pull on a sensor was a lag ten times as slow at 0.95, beside a relaxation of three times
+    the reading."""
+    speed, share = values
+    forms = form_of("sensor_lag", "speed"), form_of("sensor_relaxation", "one_time")
+    candidates = [CandidateEffect("seen", form, "sensor") for form in forms]
+    vector = np.array([7.0, np.log(speed), share, np.log(2.0)])
+    fit = SimpleNamespace(problem=SimpleNamespace(head=1, candidates=candidates), vector=vector)
+    assert at_their_ends(fit, "seen") == ended
+    assert at_their_ends(fit, "another") == ()

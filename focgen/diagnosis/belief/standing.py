@@ -62,9 +62,10 @@ def any_of(odds: Sequence[float]) -> float:
 
 def probabilities(odds: Sequence[float], instead: Sequence[float] = ()) -> np.ndarray:
     """Of every family (k,), from their log odds over the effect not being there at all; they sum to less than
-    one, for it may not be, or be none of them, or be what has the log odds ``instead`` (k,) over each."""
+    one, for it may not be, or be none of them, or be what has the log odds ``instead`` (k,) over each that
+    is likelier there than not: one that is not tells nothing of what is there instead."""
     nats = np.clip(odds, -_SURE, _SURE)
-    other = np.max(nats + instead) if len(instead) else -np.inf
+    other = max((float(n + i) for n, i in zip(nats, instead) if n > 0.0), default=-np.inf)
     none = np.logaddexp.reduce([0.0, other, *nats])
     made: np.ndarray = (1.0 - NUMBERS.elsewhere) * np.exp(nats - none)
     return made

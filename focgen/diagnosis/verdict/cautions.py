@@ -15,6 +15,7 @@ from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.verdict.confidence import nominal_instead
 from focgen.diagnosis.verdict.predicted_improvement import paths
 from focgen.diagnosis.verdict.restless import louder
+from focgen.diagnosis.verdict.sizes import at_their_ends
 from focgen.diagnosis.verdict.summary import Summary, doubts
 from focgen.diagnosis.verdict.unexplained import acts_besides, disturbed, is_driven
 
@@ -68,6 +69,17 @@ def the_rest(summary: Summary) -> Iterator[str]:
             yield (
                 f"{_within(e)}: what is left is {np.sqrt(louder(e)):.1f} times as large where the rig moves "
                 "as where it rests, which noise is not: something else acts there, which it may stand for"
+            )
+
+
+def ended(causes: Sequence[tuple[Explanation, Cause]]) -> Iterator[str]:
+    """Where a number of what was found is as far as it is looked for."""
+    for e, cause in causes:
+        effect = cause.rivals[0].effect
+        if numbers := at_their_ends(e.best, effect):
+            yield (
+                f"{_within(e)}: the {effect}'s {' and '.join(numbers)} would go on beyond where numbers are "
+                "looked for: something else may act, which it stands for"
             )
 
 

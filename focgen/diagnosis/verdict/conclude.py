@@ -18,6 +18,7 @@ from focgen.diagnosis.verdict import compose
 from focgen.diagnosis.verdict.cautions import (
     another_command,
     cautions,
+    ended,
     gauges,
     lesser,
     paced,
@@ -30,7 +31,7 @@ from focgen.diagnosis.verdict.improvement import Improvement
 from focgen.diagnosis.verdict.moments import another
 from focgen.diagnosis.verdict.moves import far_moves
 from focgen.diagnosis.verdict.nominal import likelier_nominal, nominal_alone, unnamed
-from focgen.diagnosis.verdict.sizes import estimates
+from focgen.diagnosis.verdict.sizes import at_their_ends, estimates
 from focgen.diagnosis.verdict.summary import Summary, doubts, sorted_out, sound_parts
 from focgen.diagnosis.verdict.unexplained import acts_besides, disturbed
 from focgen.diagnosis.verdict.where import locate, stage_shares
@@ -85,6 +86,7 @@ def conclude(
             *cautions(summary.causes, unknown, list(doubted), [*off, *nominal_alone(explanations, off)]),
             *lesser(stands.beside),
             *the_rest(summary),
+            *ended(summary.causes),
             *paced(explanations),
             *rounded(explanations),
             *gauges(stands.at_odds),
@@ -155,11 +157,13 @@ def _found(
     logs: Sequence[Experiment],
     trust: float,
 ) -> Found:
-    """A cause as an entry of the diagnosis, no surer than the file's own numbers can be trusted."""
+    """A cause as an entry of the diagnosis, no surer than the file's own numbers, and its own, can be
+    trusted."""
     rigs = summary.rigs
     kept, sure = tied(cause.rivals)
     sure = sure * NUMBERS.unlikely if e.freed else sure  # numbers far off explain the same
     sure = sure * NUMBERS.unlikely if summary.stands_for_more or acts_besides(e) else sure
+    trust = min(trust, NUMBERS.smaller) if at_their_ends(e.best, cause.rivals[0].effect) else trust
     sure = sure * _lasting(e, cause) * min(_beside(e, cause), trust)
     total = summary.total or Improvement(0.0, (0.0, 0.0))
     lost = _share_lost(cause, rigs, logs, summary.squares, summary.floor, total)

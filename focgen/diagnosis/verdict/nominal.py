@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from focgen.diagnosis.belief.standing import any_of, sureness
 from focgen.diagnosis.fitting.fit import Weighing
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.hypotheses.rivals import Cause, without_family
@@ -18,11 +19,18 @@ from focgen.present import present
 
 
 def likelier_nominal(explanations: Sequence[Explanation]) -> list[tuple[Explanation, Cause]]:
-    """The causes, of several in all, that are likelier the nominal chain; the one that is so least stays.
-    What is in a segment that is unknown with it does not count."""
+    """The causes, of several in all, that are likelier the nominal chain, or nothing at all; the one that is
+    so least stays. What is in a segment that is unknown with it does not count."""
     every = [(e, c) for e in explanations if e.causes and not is_unknown(e) for c in e.causes]
-    every.sort(key=lambda each: nominal_instead(each[1].rivals[0]))
-    return [(e, c) for e, c in every[1:] if nominal_instead(c.rivals[0]) > 0.5]
+    every.sort(key=lambda each: _in_vain(each[1]))
+    return [(e, c) for e, c in every[1:] if _in_vain(c) > 0.5]
+
+
+def _in_vain(cause: Cause) -> float:
+    """How likely the chain is off by itself instead, or, whichever family it is of, no such effect is
+    there."""
+    none = -any_of([rival.odds for rival in cause.rivals])
+    return max(nominal_instead(cause.rivals[0]), sureness(none))
 
 
 def nominal_alone(

@@ -11,6 +11,7 @@ from focgen.rig.effects import Parameter
 from focgen.rig.engine import slot_in
 from focgen.rig.rig import Actuator, Rig
 
+_SLACK = 1e-3  # of an end: closer is at it
 _ROLES = {
     "command": "command",
     "chamber": "pressure",
@@ -37,6 +38,21 @@ def estimates(of: Fit, which: int, rig: Rig) -> dict[str, Estimate]:
         ]
         found[parameter.name] = Estimate(ends[1], (ends[0], ends[2]), unit_of_parameter(parameter, slot, rig))
     return found
+
+
+def at_their_ends(of: Fit, effect: str) -> tuple[str, ...]:
+    """The shares and factors of an effect that are as large, or as small, as is looked for. 0 and 1, none of
+    something and all of it, are no such ends."""
+    found, place = [], of.problem.head
+    for candidate in of.problem.candidates:
+        for p in candidate.form.parameters:
+            value = np.exp(of.vector[place]) if p.log else of.vector[place]
+            ends = [e for e in (p.lower, p.upper) if np.isfinite(e) and abs(e) not in (0.0, 1.0)]
+            plain = candidate.effect == effect and not p.level and not p.time
+            if plain and any(abs(value - end) <= _SLACK * abs(end) for end in ends):
+                found.append(p.name)
+            place += 1
+    return tuple(found)
 
 
 def unit_of_parameter(parameter: Parameter, slot: str, rig: Rig) -> str:
