@@ -21,6 +21,7 @@ PACES = {
     "falls late": lambda gap, level, over: 2.0 if gap < 0.0 else 1.0,
     "rises late": lambda gap, level, over: 2.0 if gap > 0.0 else 1.0,
     "level": lambda gap, level, over: 1.0 + 0.5 * level,
+    "level's square": lambda gap, level, over: 1.0 + 2.0 * level**2,  # nine times as slow where it is bent most
     "time": lambda gap, level, over: 1.0 + 0.5 * over,
     "speed": lambda gap, level, over: 1.0 / (1.0 + 2.0 * abs(gap)),
 }
@@ -92,6 +93,7 @@ def test_a_stage_that_is_slower_one_way_keeps_its_name(case, seed, signals):
 
 
 UNEVEN = [(stage, by) for stage in ("actuator", "sensor") for by in ("level", "time", "speed")]
+UNEVEN += [("actuator", "level's square")]
 QUICK_UNEVEN = {
     (("actuator", "time"), 1, "B"),
 }

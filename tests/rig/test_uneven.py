@@ -24,23 +24,24 @@ def where(by, level, gap, i, top, fastest):
     return min(found, 1.0)
 
 
-def in_small_steps(by, rate, even, fine=100):
-    """T exp(rate w) y' + y = u by Euler steps of a hundredth of a sample, u held."""
+def in_small_steps(by, rate, even, curve=0.0, fine=100):
+    """T exp(rate w + curve w²) y' + y = u by Euler steps of a hundredth of a sample, u held."""
     top, fastest = np.max(even), np.max(np.abs(U - even))
     y, made = 0.0, []
     for i, u in enumerate(U):
         made.append(y)
         for _ in range(fine):
-            y += H / fine * (u - y) / (T * np.exp(rate * where(by, y, u - y, i, top, fastest)))
+            w = where(by, y, u - y, i, top, fastest)
+            y += H / fine * (u - y) / (T * np.exp(rate * w + curve * w * w))
     return np.array(made)
 
 
 @pytest.mark.parametrize("by", ["level", "time", "speed"])
-@pytest.mark.parametrize("rate", [0.6, -0.6])
-def test_a_lag_answers_as_its_equation_does(by, rate):
+@pytest.mark.parametrize("rate, curve", [(0.6, 0.0), (-0.6, 0.0), (0.2, 1.0), (-0.2, -0.6)])
+def test_a_lag_answers_as_its_equation_does(by, rate, curve):
     even = linear.run(LAG, U, RUN.rest, H, RUN.duration, Between.HELD) / GAIN
-    made = uneven.run(LAG, U, RUN, Pace(by, rate), Between.HELD) / GAIN
-    true = in_small_steps(by, rate, even)
+    made = uneven.run(LAG, U, RUN, Pace(by, rate, curve), Between.HELD) / GAIN
+    true = in_small_steps(by, rate, even, curve)
     change = np.max(np.abs(true - even))
     assert change > 0.05
     assert np.max(np.abs(made - true)) < 0.08 * change  # what a pace is within a sample is not followed
