@@ -37,7 +37,7 @@ def in_small_steps(by, rate, even, curve=0.0, fine=100):
 
 
 @pytest.mark.parametrize("by", ["level", "time", "speed"])
-@pytest.mark.parametrize("rate, curve", [(0.6, 0.0), (-0.6, 0.0), (0.2, 1.0), (-0.2, -0.6)])
+@pytest.mark.parametrize("rate, curve", [(0.6, 0.0), (-0.6, 0.0), (0.2, 1.0)])
 def test_a_lag_answers_as_its_equation_does(by, rate, curve):
     even = linear.run(LAG, U, RUN.rest, H, RUN.duration, Between.HELD) / GAIN
     made = uneven.run(LAG, U, RUN, Pace(by, rate, curve), Between.HELD) / GAIN
