@@ -229,7 +229,7 @@ class Numbers:
     smaller: float = _number(
         0.9,
         "how sure a cause may be, of what it would be alone: beside a larger one of its segment or a number "
-        "moved by three times its uncertainty, or with a number of its own at its end",
+        "moved far, or with one of its own at its end",
         "of the confidence",
         "50 causes of the former kind on rigs not seen before: 48 right; 14 of the latter: 12",
         "not measured",
