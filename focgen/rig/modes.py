@@ -49,8 +49,8 @@ class Modes:
 
     @property
     def in_one_row(self) -> Modes:
-        """With a lag in the place of every further pair, of its gain and its size: next to the branch cut,
-        where such pairs lie, they hardly swing."""
+        """With a lag in the place of every further pair, of its gain and its size, for loops that take one
+        row. Next to the branch cut, where most such pairs lie, they hardly swing."""
         size = np.array([abs(pole) for pole, _ in self.others])
         gain = np.array([-(residue / pole).real for pole, residue in self.others])
         rates, weights = np.append(self.rates, size), np.append(self.weights, gain * size)
@@ -82,7 +82,7 @@ def fractional_lag(T: float, alpha: float, h: float, duration: float) -> Modes:
     pole = size * cmath.exp(1j * math.pi / alpha)
     residue = -2 * pole / alpha * share  # both of the pair: twice the real part of one
     if distance > math.pi / 2:  # its share is below 1e-5 there, and the mode would grow
-        pole, residue = -size + 0j, 0j
+        pole, residue = -1.0 + 0j, 0j
     return Modes(xi, weights, pole, residue, float(SPACING * np.sum(density[seen:])))
 
 

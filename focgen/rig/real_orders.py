@@ -25,7 +25,8 @@ _BEYOND = (1.2, 1.0, 0.8)  # rad behind the cut: a pole farther on has a share b
 _QUICKER = 60.0  # in x: so far the cut goes on beyond; an order of 0.3 falls by 1e-8
 _PLACES = (0.5, 0.3, 0.7, 0.4, 0.6)  # of a spacing, of nodes from the pole that is closest to the cut
 _CLEAR = 0.5  # of |1 − e^{−w}|, which a node on a pole would bring to 0
-_APART = 0.15  # in ln s, of poles from the circle about 0
+_APART = 1.5  # in ln s, of poles from the circle about 0: closer, the cut goes as no power there
+_BELOW = 12  # spacings that the circle may be smaller for that
 _WITHIN = 0.02  # of a turn: so far about 0 goes the longest response
 _RATES = (0.1, 0.4, 0.7, 1.0)  # of that, of modes that stand for what is within: their error is 0.02⁴/4!
 _AROUND = 80  # places on that circle
@@ -81,13 +82,20 @@ def _zeros(den: Polynomial) -> Complex:
 
 
 def _first(zeros: Complex, about: float) -> float:
-    """The first node, within a spacing of ``about``: with no pole next to the cut at a node, and none on its
-    circle. It is the first of those that will do, or the best."""
+    """The first node, at ``about`` or some spacings below: no pole next to the cut is at a node, and none
+    near the circle through the first. It is the highest that will do, or the best."""
     near = zeros[np.abs(zeros.imag - math.pi) < _SPACING]
     anchor = near[np.argmin(np.abs(near.imag - math.pi))].real if len(near) else about
-    firsts = [about + (anchor - place * _SPACING - about) % _SPACING for place in _PLACES]
-    clear = np.array([_clear(zeros, near, first) for first in firsts])
-    return firsts[int(np.argmax(np.minimum(clear, 1.0)))]
+    best, clearest = about, -1.0
+    for below in range(_BELOW):
+        for place in _PLACES:
+            first = about - below * _SPACING - (about - anchor + place * _SPACING) % _SPACING
+            clear = _clear(zeros, near, first)
+            if clear >= 1.0:
+                return first
+            if clear > clearest:
+                best, clearest = first, clear
+    return best
 
 
 def _clear(zeros: Complex, near: Complex, first: float) -> float:

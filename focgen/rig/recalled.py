@@ -92,8 +92,8 @@ def recalled(
     rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] = (), closer: bool = True
 ) -> tuple[Experiment, ...]:
     """The experiments, each that begins with an input of 0, or goes on from the last, with what the earlier
-    ones put in; as they are where that would not show, or come no ``closer``, or in a rig whose actuator or
-    sensor integrates."""
+    ones put in; as they are where that would not show, or come no ``closer``, or in a rig that integrates
+    elsewhere than once, in its regulator."""
     once = rig.integrator == "regulator" and integrations(rig) == 1
     if len(logs) < 2 or not all(map(len, logs)) or ((integrations(rig) or rig.integrator) and not once):
         return tuple(logs)
@@ -107,9 +107,8 @@ def recalled(
 
 
 def memory(rig: Rig, logs: Sequence[Experiment]) -> float:
-    """How long ago, s, an input counts as 0: never, of a regulator that adds it up."""
-    if rig.integrator:
-        return np.inf
+    """How long ago, s, an input counts as 0. What a pump was told before is where it stood, which its log
+    tells."""
     return _LONGEST * response_time(rig, logs[0].sample_time, longest(logs))
 
 

@@ -17,7 +17,7 @@ from focgen.logs.between import white_level
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import Run
 from focgen.rig.engine import Chain, Placed, between_of
-from focgen.rig.rig import Actuator, Rig
+from focgen.rig.rig import Actuator, LinearActuator, Rig
 from focgen.rig.stages import ENTERS, LEAVES, STAGES
 
 _FIRST = 5  # samples that show it, at least
@@ -38,16 +38,20 @@ def standing(rig: Rig, log: Experiment, placed: Sequence[Placed], note: str) -> 
     begins = dict(log.begins)
     if role == "curvature":
         begins.pop(role, None)
-    if place and role in ENTERS:
+    if place and role in ENTERS and "command" not in begins:
         begins.setdefault(role, Begin((place,)))
+    told = place or any(not begin.known for begin in begins.values())
     notes = tuple(n for n in log.notes if n != note)
-    return replace(log, stands=place, begins=begins, notes=(*notes, note) if place or begins else notes)
+    return replace(log, stands=place, begins=begins, notes=(*notes, note) if told else notes)
 
 
 def _behind(rig: Rig, log: Experiment) -> str | None:
     """The first signal of the log behind the stage that integrates, where what enters that is in it, too."""
-    if rig.integrator is None:
-        return None
+    others = [getattr(rig, stage) for stage in ("regulator", "sensor") if stage != rig.integrator]
+    if rig.integrator == "regulator" and isinstance(rig.actuator, LinearActuator):
+        others.append(rig.actuator.dynamics)
+    if rig.integrator is None or not all(np.isfinite(of.dc_gain) for of in others):
+        return None  # where two stages add up, nothing tells the first
     stages = STAGES[STAGES.index(rig.integrator) :]
     ahead = [role for role, stage in ENTERS.items() if STAGES.index(stage) <= STAGES.index(rig.integrator)]
     if not any(role in log for role in ahead):

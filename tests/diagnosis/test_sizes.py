@@ -97,5 +97,5 @@ def test_a_number_at_the_end_of_where_it_is_looked_for_is_said(values, ended):
     candidates = [CandidateEffect("seen", form, "sensor") for form in forms]
     vector = np.array([7.0, np.log(speed), share, np.log(2.0)])
     fit = SimpleNamespace(problem=SimpleNamespace(head=1, candidates=candidates), vector=vector)
-    assert at_their_ends(fit, "seen") == ended
-    assert at_their_ends(fit, "another") == ()
+    assert at_their_ends(SimpleNamespace(effect="seen", fit=fit)) == ended
+    assert at_their_ends(SimpleNamespace(effect="another", fit=fit)) == ()

@@ -21,7 +21,9 @@ PACES = {
     "falls late": lambda gap, level, over: 2.0 if gap < 0.0 else 1.0,
     "rises late": lambda gap, level, over: 2.0 if gap > 0.0 else 1.0,
     "level": lambda gap, level, over: 1.0 + 0.5 * level,
-    "level's square": lambda gap, level, over: 1.0 + 2.0 * level**2,  # nine times as slow where it is bent most
+    "level's square": lambda gap, level, over: (
+        1.0 + 2.0 * level**2
+    ),  # nine times as slow where it is bent most
     "time": lambda gap, level, over: 1.0 + 0.5 * over,
     "speed": lambda gap, level, over: 1.0 / (1.0 + 2.0 * abs(gap)),
 }

@@ -47,6 +47,22 @@ def test_a_lag_answers_as_its_equation_does(by, rate, curve):
     assert np.max(np.abs(made - true)) < 0.08 * change  # what a pace is within a sample is not followed
 
 
+@pytest.mark.parametrize("rate, curve", [(2.5, 0.0), (2.5, 2.5), (1.0, -1.0)])
+def test_a_level_of_either_sign_is_met_by_the_fastest_of_both(rate, curve):
+    """With the fastest of one sign alone a lag overshot to seven times its input."""
+    u, h, fine = np.repeat([0.0, 1.0, -1.0, 0.5, -0.7], 150), 0.05, 200
+    lag, run = TransferFunction([(1.0, 0.0)], [(1.0, 1.0), (1.0, 0.0)]), Run.of([750], [0.0], 0.05)
+    even = linear.run(lag, u, run.rest, h, run.duration, Between.HELD)
+    y, true = 0.0, []
+    for x in u:
+        true.append(y)
+        for _ in range(fine):
+            w = np.clip(y / np.max(np.abs(even)), -1.0, 1.0)
+            y += h / fine * (x - y) / np.exp((rate + curve * w) * w)
+    made = uneven.run(lag, u, run, Pace("level", rate, curve), Between.HELD)
+    assert np.max(np.abs(made)) < 1.01 and np.sqrt(np.mean((made - true) ** 2)) < 0.05
+
+
 @pytest.mark.parametrize("between", [Between.HELD, Between.STRAIGHT])
 def test_an_even_pace_is_none(between):
     made = uneven.run(LAG, U, RUN, Pace("level", 0.0), between)

@@ -30,10 +30,11 @@ def nominal_off(change: float, static: bool) -> float:
 
     The chain of a rig was fitted to its logs until what was left could not be seen. So it may be off by part
     of the noise, and many samples show that clearly though nothing is wrong with the rig. That is mostly the
-    curve: in other ways it is off by a third as much.
+    curve: in other ways it is off by a third as much. The odds are no higher than an effect is rare: of one
+    that changes nothing no log tells anything, and the chain is off by so little or it is not.
     """
     alike = NUMBERS.bent if static else NUMBERS.bent / 3.0
-    return 4.0 * float(np.log(alike) - np.log(max(change, 1e-12)))
+    return min(4.0 * float(np.log(alike) - np.log(max(change, 1e-12))), -float(np.log(NUMBERS.rare)))
 
 
 def sureness(odds: float) -> float:
@@ -62,10 +63,9 @@ def any_of(odds: Sequence[float]) -> float:
 
 def probabilities(odds: Sequence[float], instead: Sequence[float] = ()) -> np.ndarray:
     """Of every family (k,), from their log odds over the effect not being there at all; they sum to less than
-    one, for it may not be, or be none of them, or be what has the log odds ``instead`` (k,) over each that
-    is likelier there than not: one that is not tells nothing of what is there instead."""
+    one, for it may not be, or be none of them, or be what has the log odds ``instead`` (k,) over each."""
     nats = np.clip(odds, -_SURE, _SURE)
-    other = max((float(n + i) for n, i in zip(nats, instead) if n > 0.0), default=-np.inf)
+    other = np.max(nats + instead) if len(instead) else -np.inf
     none = np.logaddexp.reduce([0.0, other, *nats])
     made: np.ndarray = (1.0 - NUMBERS.elsewhere) * np.exp(nats - none)
     return made

@@ -11,8 +11,8 @@ from focgen.rig.dynamics import Dynamics, Pace
 from focgen.rig.effects import EQUATIONS, Form, Parameter
 
 UNEVEN = "uneven_pace"
-_RATE = Parameter("rate", lower=-2.5, upper=2.5, starts=(0.3, -0.3), zero=0.0)
-_CURVE = Parameter("curve", lower=-2.5, upper=2.5, starts=(0.0,), zero=0.0)
+_RATE = Parameter("rate", lower=-1.5, upper=2.5, starts=(0.3, -0.3), zero=0.0)
+_CURVE = Parameter("curve", lower=-1.5, upper=2.5, starts=(0.0,), zero=0.0)
 
 
 def uneven_paces(problem: Problem) -> list[CandidateEffect]:

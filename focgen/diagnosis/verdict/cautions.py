@@ -76,7 +76,7 @@ def ended(causes: Sequence[tuple[Explanation, Cause]]) -> Iterator[str]:
     """Where a number of what was found is as far as it is looked for."""
     for e, cause in causes:
         effect = cause.rivals[0].effect
-        if numbers := at_their_ends(e.best, effect):
+        if numbers := at_their_ends(cause.rivals[0]):
             yield (
                 f"{_within(e)}: the {effect}'s {' and '.join(numbers)} would go on beyond where numbers are "
                 "looked for: something else may act, which it stands for"

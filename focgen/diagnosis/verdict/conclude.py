@@ -163,7 +163,7 @@ def _found(
     kept, sure = tied(cause.rivals)
     sure = sure * NUMBERS.unlikely if e.freed else sure  # numbers far off explain the same
     sure = sure * NUMBERS.unlikely if summary.stands_for_more or acts_besides(e) else sure
-    trust = min(trust, NUMBERS.smaller) if at_their_ends(e.best, cause.rivals[0].effect) else trust
+    trust = min(trust, NUMBERS.smaller) if at_their_ends(cause.rivals[0]) else trust
     sure = sure * _lasting(e, cause) * min(_beside(e, cause), trust)
     total = summary.total or Improvement(0.0, (0.0, 0.0))
     lost = _share_lost(cause, rigs, logs, summary.squares, summary.floor, total)

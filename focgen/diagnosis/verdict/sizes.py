@@ -6,6 +6,7 @@ import numpy as np
 
 from focgen.control.units import units_of_rig
 from focgen.diagnosis.fitting.fit import Fit
+from focgen.diagnosis.hypotheses.rivals import Rival
 from focgen.diagnosis.model import Estimate
 from focgen.rig.effects import Parameter
 from focgen.rig.engine import slot_in
@@ -40,15 +41,16 @@ def estimates(of: Fit, which: int, rig: Rig) -> dict[str, Estimate]:
     return found
 
 
-def at_their_ends(of: Fit, effect: str) -> tuple[str, ...]:
+def at_their_ends(rival: Rival) -> tuple[str, ...]:
     """The shares and factors of an effect that are as large, or as small, as is looked for. 0 and 1, none of
     something and all of it, are no such ends."""
-    found, place = [], of.problem.head
+    of, found = rival.fit, []
+    place = of.problem.head
     for candidate in of.problem.candidates:
         for p in candidate.form.parameters:
             value = np.exp(of.vector[place]) if p.log else of.vector[place]
             ends = [e for e in (p.lower, p.upper) if np.isfinite(e) and abs(e) not in (0.0, 1.0)]
-            plain = candidate.effect == effect and not p.level and not p.time
+            plain = candidate.effect == rival.effect and not p.level and not p.time
             if plain and any(abs(value - end) <= _SLACK * abs(end) for end in ends):
                 found.append(p.name)
             place += 1

@@ -10,13 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
-import numpy as np
-
 from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, square_by
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.hypotheses.search import likeliest_on_all
 from focgen.diagnosis.hypotheses.uneven_pace import uneven_paces
 from focgen.diagnosis.verdict.instead import Instead, gone, is_likelier, likeliest, odds_over
+from focgen.rig.dynamics import Pace
 
 _ITERATIONS = 12
 _AT = {
@@ -25,15 +24,23 @@ _AT = {
     "speed": "at its greatest speed as near rest",
 }
 
+_ON_THE_WAY = {
+    "level": "at {:.0%} of its highest level as at 0",
+    "time": "after {:.0%} of the session as at its begin",
+    "speed": "at {:.0%} of its greatest speed as near rest",
+}
+
 
 @dataclass(frozen=True, eq=False)
 class Uneven(Instead):
     """A ``stage`` that is ``slowness`` times as slow at its highest level, at the session's end or at its
-    greatest speed, ``by`` any of these, as at none."""
+    greatest speed, ``by`` any of these, as at none; or at so much of the way there (``at``), where it is
+    that most."""
 
     stage: str
     by: str
     slowness: float
+    at: float = 1.0
 
     @property
     def may_be(self) -> str:
@@ -42,7 +49,8 @@ class Uneven(Instead):
         times = self.slowness if slower else 1.0 / self.slowness
         return (
             f"the {self.stage} may be ({self.sure:.0%}) {times:.2g} times as {'slow' if slower else 'fast'} "
-            f"{_AT[self.by]}, which no effect of the library is"
+            f"{_AT[self.by] if self.at == 1.0 else _ON_THE_WAY[self.by].format(self.at)}, which no effect of "
+            "the library is"
         )
 
 
@@ -68,5 +76,7 @@ def _judged(e: Explanation, base: Fit) -> Uneven | None:
     weighing = Weighing(e.ar)
     best = fit(first.problem, first.vector, weighing, _ITERATIONS, leader=e.best)
     odds = odds_over(e, base, square_by(best, weighing), best.size - base.size)
-    pace, (rate, curve) = best.problem.candidates[-1], best.problem.values(best.vector)[-1]
-    return Uneven(gone(e, base), odds, pace.stage, pace.form.name, float(np.exp(rate + curve)))
+    found = best.problem.candidates[-1]
+    pace = Pace(found.form.name, *best.problem.values(best.vector)[-1])
+    at = pace.farthest()
+    return Uneven(gone(e, base), odds, found.stage, pace.by, float(pace.slowness(at)), at)
