@@ -126,10 +126,10 @@ class Pace:
         """So many times, any shape."""
         return np.exp((self.rate + self.curve * q) * q)
 
-    def fastest(self, lowest: float = 0.0) -> float:
-        """The least of it where q goes from ``lowest``, 0 or below, to 1."""
+    def fastest(self) -> float:
+        """The least of it from 0 to 1; a level below 0 may be met faster."""
         turn = -0.5 * self.rate / self.curve if self.curve else 0.0
-        return float(np.min(self.slowness(np.array([lowest, 0.0, 1.0, min(max(turn, lowest), 1.0)]))))
+        return float(np.min(self.slowness(np.array([0.0, 1.0, min(max(turn, 0.0), 1.0)]))))
 
     def farthest(self) -> float:
         """Where from 0 to 1 it is farthest from 1."""

@@ -1,6 +1,6 @@
 /* Stages gain/(1 + Q) whose pace is not even: (1 + s Q) y = gain x, and s, how many times as slow the stage is at a sample, depends on
- * the response itself, on how fast it goes, or on time. With `fast` no more than s, (1 + fast Q) y = gain v of v = x w + y/gain (1 - w),
- * w = fast/s: the stage is run at an even pace, and what enters it is solved for at every sample.
+ * the response itself, on how fast it goes, or on time. With `fast` the least s at levels above 0, (1 + fast Q) y = gain v of
+ * v = x w + y/gain (1 - w), w = fast/s: the stage is run at an even pace, and what enters it is solved for at every sample.
  * `pace` = {gain, fast, rate, scale, curve}: s is exp(rate q + curve q^2), q = y/(gain scale) BY_LEVEL, -1 ... 1, and
  * |x - y/gain|/scale BY_SPEED, 1 at most; otherwise `share` has w at every sample.
  * `rest` is as in kernels.c.

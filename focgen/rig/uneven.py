@@ -24,18 +24,16 @@ def run(
 ) -> Array:
     """The response (n,) of a stage whose pace is not even.
 
-    With (1 + m Q) y = x and m no less than f, (1 + f Q) y = x f/m + y (1 − f/m): of that y is solved for at
-    every sample. The part that x has may jump between samples, that of y runs in lines.
+    With (1 + m Q) y = x, and f the least m of levels above 0, (1 + f Q) y = x f/m + y (1 − f/m): of that y is
+    solved for at every sample. The part that x has may jump between samples, that of y runs in lines.
     """
-    scale, share, lowest = 1.0, np.empty(0), 0.0
-    if pace.by != "time":
-        even = linear.run(transfer, x, run.rest, run.h, run.duration, between) / transfer.dc_gain
-        depends = even if pace.by == "level" else np.abs(x - even)
-        scale = float(np.max(np.abs(depends))) or 1.0
-        lowest = min(float(np.min(depends)) / scale, 0.0)
-    fastest = pace.fastest(lowest)
+    fastest = pace.fastest()
+    scale, share = 1.0, np.empty(0)
     if pace.by == "time":
         share = fastest / pace.slowness(_moment(run))
+    else:
+        even = linear.run(transfer, x, run.rest, run.h, run.duration, between) / transfer.dc_gain
+        scale = float(np.max(np.abs(even if pace.by == "level" else x - even))) or 1.0
     slowness = _BY[pace.by], (transfer.dc_gain, fastest, pace.rate, scale, pace.curve), share
     y = solved.run_paced(_at(transfer, fastest), x, run.rest, run.h, run.duration, between, slowness)
     return delayed(y, run.rest, run.h, delay) if delay else y
