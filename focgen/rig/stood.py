@@ -102,7 +102,7 @@ def _place(rig: Rig, role: str, off: float) -> float:
     0; 0 where no level tells."""
     if role == "output":
         gain = rig.sensor.dc_gain
-        if not np.isfinite(gain) or gain == 0.0:
+        if gain == 0.0:
             return 0.0
         off /= gain
     if rig.integrator == "actuator" or role == "pressure" or rig.actuator is None:
@@ -110,7 +110,7 @@ def _place(rig: Rig, role: str, off: float) -> float:
     if isinstance(rig.actuator, Actuator):
         return _driven(rig.actuator, off)
     gain = rig.actuator.dynamics.dc_gain
-    return off / gain if np.isfinite(gain) and gain != 0.0 else 0.0
+    return off / gain if gain != 0.0 else 0.0
 
 
 def _driven(actuator: Actuator, off: float) -> float:
