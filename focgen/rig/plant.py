@@ -29,6 +29,10 @@ from focgen.rig.courses import course
 from focgen.rig.dynamics import UNCHANGED, Dynamics
 
 _HALVED = 10  # times that a step is halved for an event: what is left is run along a line
+_TURNED, _TURNED_ROUGHLY = (
+    6,
+    5,
+)  # times where nothing holds what turns round: what is left is as exact as any step
 _SHORT = 0.2  # of a radian of the plant's motion: a step of the hysteretic spring
 _YIELDS = 0.2  # of the time in which friction that rises stops what moves: a step
 _SWING = 1.0  # of a radian: a step without; between two of them the plant is not to turn round twice
@@ -80,7 +84,7 @@ def respond(
 
     ``between``: what the input does from one sample to the next. In straight lines it comes from 0 within the
     sample ahead of an experiment, as in :func:`~focgen.rig.linear.run`; else it jumps at the first sample.
-    ``rough``: steps of a hysteretic or bent spring are twice as long, with an error below 1e-3 of the
+    ``rough``: steps of a hysteretic or bent spring are twice as long, with an error mostly below 1e-3 of the
     motion, and no step is shorter than a 32nd of a sample before an event.
     """
     plant, dynamics = _whole(plant, dynamics)
@@ -119,10 +123,16 @@ def _levels(plant: Plant, dynamics: Dynamics, h: float, rough: bool = False) -> 
     steepest += 2.0 * abs(bend.first) + 3.0 * abs(bend.second) + dynamics.stiffness
     pace = _pace(plant, plant.k * steepest)
     short = _SHORT * (1.0 + rough) if dynamics.changed & {"spring", "bend", "stiffness"} else _SWING
-    short *= 1.0 if spring.power == 1.0 else 0.5
+    short *= float(np.clip(2.0 * spring.power - 1.0, 0.5, 1.0))  # below 1 a spring is the sharper about its 0
     base = h * max(pace / short, abs(dynamics.rise.size) / dynamics.rise.speed / plant.m / _YIELDS)
     base = int(np.clip(np.ceil(np.log2(max(base, 1e-9))), 0, _ROUGHLY if rough else _MOST))
-    return base, base + _HALVED
+    return base, base + _halvings(plant, dynamics, rough)
+
+
+def _halvings(plant: Plant, dynamics: Dynamics, rough: bool) -> int:
+    if plant.order == 1 or dynamics.preload or any(dynamics.drag.held):
+        return _HALVED
+    return _TURNED_ROUGHLY if rough else _TURNED
 
 
 def _pace(plant: Plant, stiffness: float) -> float:
