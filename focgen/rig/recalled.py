@@ -192,9 +192,10 @@ def _shows(
     closer: bool,
 ) -> bool:
     """Whether what was before changes what is measured, and comes ``closer`` to it while the input is still
-    0, where that is asked.
+    0, or at least no less close, where that is asked.
 
-    A rig that was reset cannot have moved there, whatever its parameters are.
+    A rig that was reset cannot have moved there, whatever its parameters are. Its zero may be off: by as much
+    in all logs, those too that nothing was before.
     """
     entry = next(role for role in ENTERS if role in logs[0])
     leaves = [s for s in STAGES[STAGES.index(ENTERS[entry]) :] if all(LEAVES[s] in log for log in logs)]
@@ -209,8 +210,9 @@ def _shows(
     asked = [log.before(entry).known and not goes_on(log, found[:n]) for n, log in enumerate(found)]
     if not any(asked):
         return True
-    idle = np.concatenate([_still(log, entry) & a for log, a in zip(found, asked)])
-    return bool(np.sum((y - after)[idle] ** 2) < np.sum((y - before)[idle] ** 2))
+    rest = [log.before(entry).at_rest for log in found]
+    idle = np.concatenate([_still(log, entry) & (a or b) for log, a, b in zip(found, asked, rest)])
+    return bool(np.var((y - after)[idle]) < _CONTRADICTED * np.var((y - before)[idle]))
 
 
 def _made(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment], entry: str, leaves: str) -> Array:

@@ -118,3 +118,28 @@ def test_a_part_that_brings_nothing_closer_leaves_its_segment_unknown(monkeypatc
         monkeypatch.setattr(summary, name, lambda *a, answer=answer: answer)
     found = summary.sorted_out(None, [], None, [e], granted=False)
     assert found.unknown == ([e] if whole else [])
+
+
+@pytest.mark.parametrize(
+    "apart, pace, others, unknown",
+    [
+        (True, 0.0, False, True),
+        (True, 0.0, True, True),  # another segment's effect is named, and this much is left beside it
+        (False, 1.0, False, True),
+        (False, 1.0, True, False),  # what adds up is what the other one left
+    ],
+)
+def test_what_leaves_far_more_than_noise_is_said_to_be_unknown(monkeypatch, apart, pace, others, unknown):
+    e = replace(explained(monkeypatch, "creep"), segment=SimpleNamespace(pace=pace))
+    left = SimpleNamespace(in_vain=False, more_is_left=False, causes=[(e, None)] if others else [])
+    for name, answer in {
+        "crossed": [],
+        "is_unknown": False,
+        "_no_closer": [e] if apart else [],
+        "_unaccounted": True,
+        "_at_odds": [],
+        "_summary": left,
+    }.items():
+        monkeypatch.setattr(summary, name, lambda *a, answer=answer: answer)
+    found = summary.sorted_out(None, [], None, [e], granted=False)
+    assert found.unknown == ([e] if unknown else [])

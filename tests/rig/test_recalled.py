@@ -168,6 +168,21 @@ def test_experiments_that_each_began_at_rest_are_believed(tmp_path: Path) -> Non
     assert not any(log.before("pressure").known for log in begun_session(rig, reset))
 
 
+@pytest.mark.parametrize("zero", [-0.4, 0.0, 0.4])
+@pytest.mark.parametrize("remembers", [True, False])
+def test_a_zero_that_is_off_is_no_past_and_hides_none(tmp_path: Path, zero: float, remembers: bool) -> None:
+    """It is the same in every log, those too that nothing was before; a past is not in the first one. The
+    nominal rig knows of no offset, and has a gain to be refitted."""
+    rig, logs = _rig(tmp_path), _logs(rest=10.0)
+    outputs = [log["output"] for log in logs]
+    if not remembers:
+        noise = np.random.default_rng(7).normal(0.0, NOISE, len(logs[0]))
+        outputs = [made["output"] + noise for made in simulate_session(rig, logs)]
+    off = [replace(log, signals={**log.signals, "output": y + zero}) for log, y in zip(logs, outputs)]
+    told = [log.before("pressure").known for log in recalled(rig, off)]
+    assert told == [False, remembers, remembers]
+
+
 @pytest.mark.parametrize("rest", [3.0, 30.0])
 def test_windows_hold_what_went_in(tmp_path: Path, rest: float) -> None:
     """The past that is put ahead has the integral of what the logs hold."""

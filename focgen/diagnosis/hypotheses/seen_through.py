@@ -88,11 +88,9 @@ def _seen_through(
     converter: Converter, best: Fit, beside: Beside, asked: AcceptanceCriteria
 ) -> tuple[dict[str, Fit], Cause] | None:
     """Families beside those of ``best``, each fitted without the steps, and the cause that the likeliest of
-    them is with the steps simulated. None where inputs predict little of what is left, or none is likelier
-    than none."""
+    them is with the steps simulated. None where none is likelier than none. How much inputs predict is not
+    asked: what is left where levels change late or soon are whole steps, of which nothing predicts much."""
     base = converter.stepped(best)
-    if base.predictable_share < NUMBERS.left:
-        return None
     plain = _every_family(_ranked(best, beside))
     tried = {n: s for n, f in plain.items() if evidence(s := converter.stepped(f), base) > asked.threshold}
     if not tried:

@@ -104,7 +104,7 @@ def sorted_out(
     if summary.in_vain and (vain := _in_vain(summary)):
         unknown += vain
         summary = summary_without(unknown)
-    bare = apart or [e for e in explanations if e.segment.pace]
+    bare = apart or [e for e in explanations if e.segment.pace and not summary.causes]
     if not unknown and bare and _unaccounted(summary):
         unknown += bare
     beside = summary.causes if unknown and summary.more_is_left else []
@@ -158,10 +158,10 @@ def sound_parts(explanations: Sequence[Explanation]) -> dict[Explanation, Explan
 
 
 def _unaccounted(summary: Summary) -> bool:
-    """Whether nothing was found, and yet the output is off by far more than noise. Where errors add up, no
-    segment need show it: gusts in a path are gone from its own errors at their pace. And what a segment's own
-    effects bring no closer is there nevertheless."""
-    return not summary.causes and summary.floor < NUMBERS.vain * float(np.mean(summary.squares["explained"]))
+    """Whether the output is off by far more than noise, whatever was found. Where errors add up, no segment
+    need show it: gusts in a path are gone from its own errors at their pace. And what a segment's own effects
+    bring no closer is there nevertheless, beside what another's close."""
+    return summary.floor < NUMBERS.vain * float(np.mean(summary.squares["explained"]))
 
 
 def _in_vain(summary: Summary) -> list[Explanation]:
