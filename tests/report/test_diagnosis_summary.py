@@ -71,6 +71,16 @@ def test_what_nothing_explains_is_said_with_the_nearest_family_once():
     assert "depends on nothing" not in text and text.count("nearest: creep, which by itself leaves 55%") == 1
 
 
+def test_the_nearest_family_of_what_nothing_explains_is_none_that_is_named_elsewhere():
+    named = FOUND.causes[0].candidates[0].effect
+    fits = (PlainFit(named, 0.1), PlainFit("creep", 0.55))
+    left = {"pressure to output": {"depends_on": ["time"]}}
+    text = diagnosis_text(replace(FOUND, unexplained=left, fits=fits), UNITS, "gap")
+    assert f"{named} in the" in text and "nearest: creep, which by itself leaves 55%" in text
+    text = diagnosis_text(replace(FOUND, unexplained=left, fits=fits[:1]), UNITS, "gap")
+    assert "nearest" not in text
+
+
 def test_healthy_and_refitted_rigs_name_no_effect():
     healthy = replace(FOUND, verdict="none", causes=(), where=Where(None, False, {}, {}), shrink=None)
     assert "Which: no effect." in diagnosis_text(healthy, UNITS, "gap")
