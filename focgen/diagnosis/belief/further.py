@@ -20,17 +20,21 @@ Rule = Callable[[int, float, float, Scale, float], float]
 @dataclass(frozen=True)
 class Surroundings:
     """What makes a misfit beside the forms. ``hidden``: the mean square that a coarse converter may make, as
-    a share of the level's; ``carried``: likewise what an input has lost; ``noise`` (n,): a draw of what
-    stays in the input of its noise, in its unit."""
+    a share of the level's; ``lost`` (n,): a draw of what an input has lost, and ``noise`` (n,) of what stays
+    in it of its noise, in its unit."""
 
     hidden: float = 0.0
-    carried: float = 0.0
+    lost: np.ndarray | None = None
     noise: np.ndarray | None = None
 
-    def nats(self, count: int, noise: float) -> float:
-        """Of ``count`` samples whose noise has the mean square ``noise``, a share of the level's."""
-        share = NUMBERS.other + (self.hidden + self.carried) / max(noise, 1e-300)
-        return 0.5 * count * share
+    def nats(self, of: Fit, noise: float, floor: float, weighing: Weighing) -> float:
+        """Beside a fit, where noise has the mean square ``noise``, a share of the level's, and the sum of
+        squares ``floor`` of innovations. What the output lacks for what its input has lost is slow: it counts
+        in the colour of the noise, which hides much of what is slow."""
+        count = len(of.innovations)
+        lost = 0.0 if self.lost is None else answer(of, self.lost, weighing)
+        share = NUMBERS.other + self.hidden / max(noise, 1e-300)
+        return 0.5 * count * share + _nats(lost, floor, count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +79,7 @@ class Ground:
         noise = float(np.mean(best.weighed**2)) * (1.0 - told)
         floor = best.sse * (1.0 - told)
         before = square_by(first, weighing) if base.problem.candidates else base.sse
-        scale = Scale(surroundings.nats(count, noise))
+        scale = Scale(surroundings.nats(base, noise, floor, weighing))
         return cls(base, floor, _nats(before - base.sse, floor, count), scale, weighing, surroundings.noise)
 
     def misfit(self, of: Fit) -> float:

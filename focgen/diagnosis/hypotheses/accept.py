@@ -15,20 +15,19 @@ from focgen.diagnosis.fitting.integrating import counted
 from focgen.diagnosis.hypotheses.converter import Converter
 from focgen.diagnosis.hypotheses.disturbance import disturbance
 from focgen.diagnosis.hypotheses.search import Ranking, family
+from focgen.diagnosis.problem.smooth import Strays
 from focgen.rig.effects import library
 
 
 @dataclass(frozen=True)
 class AcceptanceCriteria:
     """What an effect has to show to be one. ``threshold``: nats of evidence that noise alone does not reach;
-    ``carried``: the mean square, as a share of the output's level, of what the output may lack for what its
-    input has lost; ``noise`` (n,): what stays in that of its noise; ``converter``: that hides small ones, and
-    so does what a logger has ``withheld``, root mean square, as a share of the output's level. ``granted``:
-    it is there, and only its strength is asked."""
+    ``unsure``: what the input may have lost, and what stays in it of its noise; ``converter``: that hides
+    small ones, and so does what a logger has ``withheld``, root mean square, as a share of the output's
+    level. ``granted``: it is there, and only its strength is asked."""
 
     threshold: float
-    carried: float
-    noise: np.ndarray | None
+    unsure: Strays | None
     converter: Converter | None
     withheld: float = 0.0
     granted: bool = False
@@ -37,7 +36,12 @@ class AcceptanceCriteria:
     def surroundings(self) -> Surroundings:
         """What makes a misfit beside the forms."""
         hidden = self.converter.uneven if self.converter else self.withheld
-        return Surroundings(hidden**2, self.carried, self.noise)
+        lost, noise = (None, None) if self.unsure is None else (self.unsure.lost, self.unsure.noise)
+        return Surroundings(hidden**2, _if_any(lost), _if_any(noise))
+
+
+def _if_any(draw: np.ndarray | None) -> np.ndarray | None:
+    return draw if draw is not None and np.any(draw) else None
 
 
 def select(rankings: Sequence[Ranking], criteria: AcceptanceCriteria) -> Fit | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from focgen.diagnosis.fitting.fit import WHITE, Fit, Weighing, answer, fit
+from focgen.diagnosis.fitting.fit import WHITE, Fit, Weighing, fit
 from focgen.diagnosis.fitting.integrating import settled
 from focgen.diagnosis.fitting.predictability import Predictability, predictability
 from focgen.diagnosis.fitting.realign import realigned
@@ -210,9 +210,8 @@ def _explained(
     if only is not None:
         candidates, guests, threshold = [c for c in candidates if c.effect in only], [], 0.0
     given, converter = problem.nominal(), converter_of(problem, candidates)
-    carried, noise = _unsure(problem, given, unsure)
     withheld, granted = problem.segment.withheld, only is not None
-    asked = AcceptanceCriteria(threshold, carried, noise, converter, withheld, granted)
+    asked = AcceptanceCriteria(threshold, unsure, converter, withheld, granted)
     rankings, candidates = _grown([], problem, given, candidates, guests, asked)
     rankings = _or_two(rankings, candidates, asked)
     known = [f for r in rankings for f in (r.base, *r.best.values())]
@@ -254,16 +253,6 @@ def _off_by_itself(e: Explanation, off: Examined | None) -> Explanation:
     response = e.nominal.problem.references.clocks["response"]
     with_it = predictability(e.segment, off.best.weighed, response)
     return replace(e, whole=replace(e, best=off.best, causes=off.causes, predictability=with_it))
-
-
-def _unsure(problem: Problem, vector: np.ndarray, unsure: Strays | None) -> tuple[float, np.ndarray | None]:
-    """The mean square, as a share of the output's level, of what the output lacks for what the input has
-    lost; and the noise (n,) that stays in the input, None where there is none."""
-    if unsure is None:
-        return 0.0, None
-    lost, noise = unsure.lost, unsure.noise
-    carried = answer(fit(problem, vector, WHITE, 0), lost, WHITE) / len(lost) if np.any(lost) else 0.0
-    return carried, noise if np.any(noise) else None
 
 
 def begun_as(of: Explanation, fit: Fit, logs: Sequence[Experiment]) -> Fit:
