@@ -104,11 +104,10 @@ def _unexplained(place: str, what: Mapping[str, Any]) -> str:
 
 
 def _nearest(found: Diagnosis) -> list[str]:
-    """The family that comes nearest where something is left unexplained, of those that are not in question
-    elsewhere."""
-    named = {c.effect for cause in found.causes for c in cause.candidates}
-    near = min((f for f in found.fits if f.effect not in named), key=lambda fit: fit.error, default=None)
-    if near is None or not found.unexplained:
+    """The family that comes nearest where nothing was found; beside what was, a note says it of each
+    place."""
+    near = min(found.fits, key=lambda fit: fit.error, default=None)
+    if near is None or found.causes or not found.unexplained:
         return []
     return [f"  nearest: {near.effect}, which by itself leaves {near.error:.0%} of the error where it acts."]
 

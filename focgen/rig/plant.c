@@ -276,7 +276,10 @@ static void sample(const Plant *p, State *s, const double *c)
             s->v = 0.0, s->moving = s->side = 0;
             started(p, s, d[0] + part * (u - d[0]), u, (1.0 - part) * span);
         } else if (again && ahead < 0.0 && p->order == 2 && p->stick == 0.0 && (s->moving || p->preload == 0.0)) {
-            if (!s->moving) to = stepped(p, *s, d, level, push(p, s, u) < 0.0 ? -1 : 1);
+            if (!s->moving) {
+                s->moving = push(p, s, u) < 0.0 ? -1 : 1;
+                to = stepped(p, *s, d, level, s->moving);
+            }
             *s = to, s->moving = to.v < 0.0 ? -1 : 1; /* nothing holds it: it turns round, or sets out */
         } else if (again && ahead < 0.0) { /* the event is in this short step: what is left of it, by lines */
             double was = s->moving ? s->moving * s->v : holds(p, s) - fabs(push(p, s, d[0]));

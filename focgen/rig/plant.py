@@ -29,10 +29,8 @@ from focgen.rig.courses import course
 from focgen.rig.dynamics import UNCHANGED, Dynamics
 
 _HALVED = 10  # times that a step is halved for an event: what is left is run along a line
-_TURNED, _TURNED_ROUGHLY = (
-    6,
-    5,
-)  # times where nothing holds what turns round: what is left is as exact as any step
+_TURNED = 6  # times where nothing holds what turns round: what is left is a step like any other,
+_TURNED_ROUGHLY = 5  # and where a run is rough
 _SHORT = 0.2  # of a radian of the plant's motion: a step of the hysteretic spring
 _YIELDS = 0.2  # of the time in which friction that rises stops what moves: a step
 _SWING = 1.0  # of a radian: a step without; between two of them the plant is not to turn round twice
@@ -123,14 +121,22 @@ def _levels(plant: Plant, dynamics: Dynamics, h: float, rough: bool = False) -> 
     steepest += 2.0 * abs(bend.first) + 3.0 * abs(bend.second) + dynamics.stiffness
     pace = _pace(plant, plant.k * steepest)
     short = _SHORT * (1.0 + rough) if dynamics.changed & {"spring", "bend", "stiffness"} else _SWING
-    short *= float(np.clip(2.0 * spring.power - 1.0, 0.5, 1.0))  # below 1 a spring is the sharper about its 0
+    short *= _evenness(spring.power, rough)
     base = h * max(pace / short, abs(dynamics.rise.size) / dynamics.rise.speed / plant.m / _YIELDS)
     base = int(np.clip(np.ceil(np.log2(max(base, 1e-9))), 0, _ROUGHLY if rough else _MOST))
     return base, base + _halvings(plant, dynamics, rough)
 
 
+def _evenness(power: float, rough: bool) -> float:
+    """What a step may be of one for a power of 1, for which a spring is run exactly; roughly the nearest
+    powers are as even."""
+    if power == 1.0:
+        return 1.0
+    return float(np.clip(1.0 - 2.0 * abs(power - 1.0), 0.5, 1.0)) if rough else 0.5
+
+
 def _halvings(plant: Plant, dynamics: Dynamics, rough: bool) -> int:
-    if plant.order == 1 or dynamics.preload or any(dynamics.drag.held):
+    if plant.order == 1 or dynamics.preload or dynamics.rise.size or any(dynamics.drag.held):
         return _HALVED
     return _TURNED_ROUGHLY if rough else _TURNED
 

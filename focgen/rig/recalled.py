@@ -31,7 +31,7 @@ from focgen.rig.stood import standing
 
 NOTE = "begins before the rig has come to rest: the experiments before are simulated ahead of it"
 _RECALLED = 0.98  # of the mean square that is left without: more is no sign that the rig remembers
-_CONTRADICTED = 1.02  # of the same: less does not speak against what is known
+_CONTRADICTED = 1.02  # of the same, or of a variance: less does not speak against what is known
 _LONGEST = 250.0  # response times: what is longer ago counts as 0
 _WIDTH = 0.1  # of how long ago it is: a window
 _NOTHING = 0.06  # of the input's largest magnitude: what counts as 0, as in focgen.rig.initial
@@ -191,11 +191,11 @@ def _shows(
     found: Sequence[Experiment],
     closer: bool,
 ) -> bool:
-    """Whether what was before changes what is measured, and comes ``closer`` to it while the input is still
-    0, or at least no less close, where that is asked.
+    """Whether what was before changes what is measured, and where that is asked comes ``closer`` to it while
+    the input is still 0.
 
     A rig that was reset cannot have moved there, whatever its parameters are. Its zero may be off: by as much
-    in all logs, those too that nothing was before.
+    in all logs, those too that nothing was before. Where there are such ones, they tell how far.
     """
     entry = next(role for role in ENTERS if role in logs[0])
     leaves = [s for s in STAGES[STAGES.index(ENTERS[entry]) :] if all(LEAVES[s] in log for log in logs)]
@@ -210,9 +210,12 @@ def _shows(
     asked = [log.before(entry).known and not goes_on(log, found[:n]) for n, log in enumerate(found)]
     if not any(asked):
         return True
-    rest = [log.before(entry).at_rest for log in found]
-    idle = np.concatenate([_still(log, entry) & (a or b) for log, a, b in zip(found, asked, rest)])
-    return bool(np.var((y - after)[idle]) < _CONTRADICTED * np.var((y - before)[idle]))
+    idle = np.concatenate([(_still(log, entry) | _first(log)) & a for log, a in zip(found, asked)])
+    rest = np.concatenate([_still(log, entry) & log.before(entry).at_rest for log in found])
+    if not rest.any():
+        return bool(np.sum((y - after)[idle] ** 2) < np.sum((y - before)[idle] ** 2))
+    both = idle | rest
+    return bool(np.var((y - after)[both]) < _CONTRADICTED * np.var((y - before)[both]))
 
 
 def _made(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment], entry: str, leaves: str) -> Array:
@@ -224,9 +227,13 @@ def _made(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment], entry:
 
 
 def _still(log: Experiment, role: str) -> Bools:
-    """Which samples (n,) are ahead of the first at which the input is no longer 0, and the first of all, at
-    which nothing has moved yet."""
+    """Which samples (n,) are ahead of the first at which the input is no longer 0."""
     x = np.abs(np.asarray(log[role], float))
     made: Bools = np.logical_and.accumulate(x <= _NOTHING * float(np.max(x)))
-    made[:1] = True
+    return made
+
+
+def _first(log: Experiment) -> Bools:
+    """The first of all samples (n,), at which nothing has moved yet."""
+    made: Bools = np.arange(len(log)) == 0
     return made

@@ -16,7 +16,7 @@ from focgen.diagnosis.belief.further import Ground, Surroundings
 from focgen.diagnosis.belief.likelihood import Scale, log_likelihood, paid
 from focgen.diagnosis.belief.standing import behind, least_set, nominal_off, probabilities, tied_within
 from focgen.diagnosis.belief.unknown import is_none
-from focgen.diagnosis.fitting.fit import WHITE, fit
+from focgen.diagnosis.fitting.fit import WHITE, Weighing, fit
 from focgen.diagnosis.hypotheses import explain, rivals
 from focgen.diagnosis.hypotheses.nuisances import uncertain
 from focgen.diagnosis.hypotheses.rivals import Rival, _needed
@@ -201,6 +201,29 @@ def test_an_uneven_converter_and_an_input_that_lost_something_hide_small_effects
     base, better = _fit(1.1), _fit(1.0, ["leak"])
     assert likeliest(_ground(base, [better]), [better])[1] > 0.0
     assert likeliest(_ground(base, [better], **around), [better])[1] < 0.0
+
+
+def test_what_an_input_has_lost_counts_in_the_colour_of_the_noise():
+    """A slow loss of a tenth of what slow noise is: as it stands it hides a hundredth, and in the noise's
+    colour next to nothing; a quick one the more."""
+    n, t = 2000, np.arange(2000) * H
+    u = np.repeat([0.0, 1.0, 0.5, 0.8], n // 4)
+    y = u + lfilter([0.01], [1.0, -0.95], np.random.default_rng(3).standard_normal(n))
+    logs = [Experiment("steps", H, {"command": u, "pressure": y, "output": y})]
+    rig = Rig(Actuator(0.5, 1.0, (1.0,)), H, Signals(time="t", output="y"))
+    problem = uncertain(rig, make(logs, "command", "pressure"), logs)
+    slow, quick = (0.003 * np.sin(2.0 * np.pi * f * t) for f in (0.05, 5.0))
+
+    def hidden(lost, weighing):
+        bare = fit(problem, problem.nominal(), weighing, 0)
+        floor = bare.sse
+        around, alone = Surroundings(lost=lost), Surroundings()
+        noise = float(np.mean(bare.weighed**2))
+        return around.nats(bare, noise, floor, weighing) - alone.nats(bare, noise, floor, weighing)
+
+    coloured = Weighing(np.array([1.0, -0.95]))
+    assert hidden(slow, WHITE) == pytest.approx(hidden(quick, WHITE), rel=0.05)
+    assert hidden(slow, coloured) < 0.2 * hidden(slow, WHITE) < hidden(quick, coloured)
 
 
 def test_to_leave_less_for_being_deaf_to_noise_of_the_input_is_no_merit(monkeypatch):

@@ -143,3 +143,26 @@ def test_what_leaves_far_more_than_noise_is_said_to_be_unknown(monkeypatch, apar
         monkeypatch.setattr(summary, name, lambda *a, answer=answer: answer)
     found = summary.sorted_out(None, [], None, [e], granted=False)
     assert found.unknown == ([e] if unknown else [])
+
+
+def test_what_one_segment_brings_no_closer_leaves_what_is_clear_in_another(monkeypatch):
+    """Though more is left than was closed. And what was left out stays so, whatever is unknown beside it."""
+    clear, last = (replace(explained(monkeypatch, "creep"), segment=SimpleNamespace(pace=0.0)) for _ in "ab")
+    left_out = []
+
+    def summed(*given):
+        left_out.append(given[-1])
+        return SimpleNamespace(in_vain=False, more_is_left=True, causes=[(clear, None)])
+
+    for name, answer in {
+        "crossed": [],
+        "is_unknown": False,
+        "_no_closer": [last],
+        "_unaccounted": True,
+        "_at_odds": [clear],
+    }.items():
+        monkeypatch.setattr(summary, name, lambda *a, answer=answer: answer)
+    monkeypatch.setattr(summary, "_summary", summed)
+    found = summary.sorted_out(None, [], None, [clear, last], granted=False)
+    assert found.beside == [] and found.unknown == [last, clear]
+    assert all(last in given for given in left_out)

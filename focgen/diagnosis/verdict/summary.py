@@ -89,16 +89,16 @@ def sorted_out(
     granted: bool,
 ) -> SortedOut:
     """Which explanations stand. Every one that is left out changes what the others amount to."""
-
-    def summary_without(unknown: Sequence[Explanation]) -> Summary:
-        return _summary(rig, logs, rigs, explanations, unknown)
-
     out = [] if granted else crossed(rig, logs, explanations)
     apart = _no_closer(rig, logs, rigs, explanations)
     # of a part that is no closer, the rest was something that no effect is
     unknown = [e for e in explanations if e in out or is_unknown(e) or (e in apart and e.whole is not None)]
     apart = [e for e in apart if e not in unknown]
-    summary = summary_without([*unknown, *apart])
+
+    def summary_without(unknown: Sequence[Explanation]) -> Summary:
+        return _summary(rig, logs, rigs, explanations, [*unknown, *apart])
+
+    summary = summary_without(unknown)
     if granted:
         return SortedOut(summary, unknown, [], [])
     if summary.in_vain and (vain := _in_vain(summary)):
@@ -107,7 +107,8 @@ def sorted_out(
     bare = apart or [e for e in explanations if e.segment.pace and not summary.causes]
     if not unknown and bare and _unaccounted(summary):
         unknown += bare
-    beside = summary.causes if unknown and summary.more_is_left else []
+    # what one segment's effects bring no closer takes nothing away from what is clear in another
+    beside = summary.causes if unknown and unknown != apart and summary.more_is_left else []
     if beside:
         unknown += dict.fromkeys(e for e, _ in beside)
         summary = summary_without(unknown)
@@ -160,7 +161,7 @@ def sound_parts(explanations: Sequence[Explanation]) -> dict[Explanation, Explan
 def _unaccounted(summary: Summary) -> bool:
     """Whether the output is off by far more than noise, whatever was found. Where errors add up, no segment
     need show it: gusts in a path are gone from its own errors at their pace. And what a segment's own effects
-    bring no closer is there nevertheless, beside what another's close."""
+    bring no closer is there nevertheless, whatever those of another segment do."""
     return summary.floor < NUMBERS.vain * float(np.mean(summary.squares["explained"]))
 
 
