@@ -183,6 +183,19 @@ def test_a_zero_that_is_off_is_no_past_and_hides_none(tmp_path: Path, zero: floa
     assert told == [False, remembers, remembers]
 
 
+def test_where_no_log_tells_its_zero_a_rig_that_was_reset_is_believed(tmp_path: Path) -> None:
+    """The first log begins with its first step. What a past would leave is below the noise of a sample, so
+    that its decay shows nothing, and its mean shows all."""
+    rig, logs = _rig(tmp_path), _logs(rest=40.0)
+    cut = {role: values[20:] for role, values in logs[0].signals.items()}
+    logs[0] = replace(logs[0], signals=cut, start=logs[0].start + 20 * H)
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        made = [m["output"] + rng.normal(0.0, 0.05, len(m["output"])) for m in simulate_session(rig, logs)]
+        reset = [replace(log, signals={**log.signals, "output": y}) for log, y in zip(logs, made)]
+        assert all(a is b for a, b in zip(reset, recalled(rig, reset)))
+
+
 @pytest.mark.parametrize("rest", [3.0, 30.0])
 def test_windows_hold_what_went_in(tmp_path: Path, rest: float) -> None:
     """The past that is put ahead has the integral of what the logs hold."""
