@@ -11,7 +11,7 @@
  * Between events the equation is linear, and a step is exact for an input that is a cubic: `tables` hold, for steps of h/2^level from
  * `level` = base on, what the state and the four coefficients of the input count. w is a cubic through its values and slopes at the
  * ends of a step of level base. Where the velocity changes sign or the friction gives way, steps are halved down to `last`, and what
- * is left there is run along a line.
+ * is left there is run along a line, or, where nothing holds what moves, in a step like any other.
  */
 #include <math.h>
 #include "bent.h"

@@ -36,12 +36,13 @@ class AcceptanceCriteria:
     def surroundings(self) -> Surroundings:
         """What makes a misfit beside the forms."""
         hidden = self.converter.uneven if self.converter else self.withheld
-        lost, noise = (None, None) if self.unsure is None else (self.unsure.lost, self.unsure.noise)
-        return Surroundings(hidden**2, _if_any(lost), _if_any(noise))
+        if self.unsure is None:
+            return Surroundings(hidden**2)
+        return Surroundings(hidden**2, _if_any(self.unsure.lost), _if_any(self.unsure.noise))
 
 
-def _if_any(draw: np.ndarray | None) -> np.ndarray | None:
-    return draw if draw is not None and np.any(draw) else None
+def _if_any(draw: np.ndarray) -> np.ndarray | None:
+    return draw if np.any(draw) else None
 
 
 def select(rankings: Sequence[Ranking], criteria: AcceptanceCriteria) -> Fit | None:
