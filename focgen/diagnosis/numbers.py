@@ -168,9 +168,10 @@ class Numbers:
     loudest: float = _number(
         5.0,
         "mean square of the loudest response time over the usual one, of the same; "
-        "where the rig moves over where it rests, of what is left; twice that beside an effect",
+        "where the rig moves over where it rests, of what is left",
         "ratio",
-        "healthy rigs: at most 4, and 1.5 where it moves; named rightly: 7.2; outside: 17 and 20",
+        "healthy rigs: at most 4, and 1.5 where it moves; of 109 sure and right names one above 3.5; "
+        "outside: 7.6, 17 and 20",
     )
     tonal: float = _number(
         0.25,

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from focgen.diagnosis.diagnose import diagnose
+from focgen.diagnosis.verdict import restless as restless_of
 from focgen.diagnosis.verdict.restless import louder
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
@@ -75,6 +76,18 @@ def test_noise_is_as_loud_at_rest(colour):
 def test_what_an_effect_explains_keeps_its_confidence():
     found = diagnose(RIG, session(4, seen=lambda y: np.r_[np.zeros(4), y[:-4]]), pictures=False)
     assert max(c.confidence for cause in found.causes for c in cause.candidates) > 0.9
+
+
+@pytest.mark.parametrize("causes", [(), ("an effect",)], ids=["alone", "beside an effect"])
+@pytest.mark.parametrize("times, restless", [(4.5, False), (7.5, True)])
+def test_a_form_that_is_a_little_wrong_leaves_little_more_where_it_moves(
+    times, restless, causes, monkeypatch
+):
+    monkeypatch.setattr(restless_of, "louder", lambda e: times)
+    monkeypatch.setattr(restless_of, "is_rounded", lambda causes: False)
+    segment = SimpleNamespace(closed=False, pace=0.0, withheld=0.0)
+    e = SimpleNamespace(segment=segment, converter=None, causes=causes)
+    assert restless_of.is_restless(e) is restless
 
 
 def explained(made, left):

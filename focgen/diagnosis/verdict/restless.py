@@ -24,13 +24,11 @@ _SURE = 2.5  # standard errors by which the two are apart
 
 
 def is_restless(e: Explanation) -> bool:
-    """Whether what is left of a segment is far louder where it moves: twice as much beside an effect, whose
-    form is a little wrong there. What rounds is so by nature; errors that add up, or go round in a loop, are
-    left where they come about by neither."""
+    """Whether what is left of a segment is far louder where it moves. What rounds is so by nature; errors that
+    add up, or go round in a loop, are left where they come about by neither."""
     if e.segment.closed or e.segment.pace or e.segment.withheld or e.converter is not None:
         return False
-    most = NUMBERS.loudest * (2.0 if e.causes else 1.0)
-    return not is_rounded(e.causes) and louder(e) > most
+    return not is_rounded(e.causes) and louder(e) > NUMBERS.loudest
 
 
 @lru_cache(maxsize=16)
