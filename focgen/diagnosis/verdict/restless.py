@@ -24,8 +24,8 @@ _SURE = 2.5  # standard errors by which the two are apart
 
 
 def is_restless(e: Explanation) -> bool:
-    """Whether what is left of a segment is far louder where it moves. What rounds is so by nature; errors that
-    add up, or go round in a loop, are left where they come about by neither."""
+    """Whether what is left of a segment is far louder where it moves. What rounds is so by nature; errors
+    that add up, or go round in a loop, are left where they come about by neither."""
     if e.segment.closed or e.segment.pace or e.segment.withheld or e.converter is not None:
         return False
     return not is_rounded(e.causes) and louder(e) > NUMBERS.loudest
