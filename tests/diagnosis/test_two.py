@@ -40,6 +40,7 @@ def asked(monkeypatch, both, found):
         return ranking(None, *beside[problem.families[0]])
 
     monkeypatch.setattr(two, "rank", rank)
+    monkeypatch.setattr(two, "looked_anew", lambda first, second, candidates, surroundings: second)
     monkeypatch.setattr(two, "fit", lambda problem, vector, weighing, iterations: known[id(problem)])
     fits = (gap, bend, creep, friction, both, found or bend)
     known = {id(f.problem): f for f in fits}

@@ -12,6 +12,7 @@ from focgen.diagnosis.fitting.integrating import settled
 from focgen.diagnosis.fitting.predictability import Predictability, predictability
 from focgen.diagnosis.fitting.realign import realigned
 from focgen.diagnosis.hypotheses.accept import AcceptanceCriteria, select
+from focgen.diagnosis.hypotheses.anew import looked_anew
 from focgen.diagnosis.hypotheses.between_samples import between_anew, in_the_end, moved_to
 from focgen.diagnosis.hypotheses.converter import Converter, converter_of
 from focgen.diagnosis.hypotheses.foretelling import foretelling
@@ -301,7 +302,9 @@ def _grown(
     last one being of what is left; and the candidate effects that were tried.
     """
     while len(rankings) < _DEPTH:
-        rankings.append(rank(base, vector, _worth_trying(base, vector, base.untried(candidates))))
+        ranking = rank(base, vector, _worth_trying(base, vector, base.untried(candidates)))
+        first = rankings[0].base if rankings else ranking.base
+        rankings.append(looked_anew(first, ranking, candidates, asked.surroundings))
         best = select(rankings, asked)
         if best is None and guests and _much_left(rankings[-1].base):
             candidates, guests = candidates + guests, []

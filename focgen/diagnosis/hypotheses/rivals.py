@@ -122,7 +122,7 @@ def _cause(name: str, best: Fit, beside: Beside) -> Cause:
     unseen = {n for n in (*fits, *twin) if n != name and best.problem.lacks(n)}
 
     def speaks(of: Fit, family: str) -> float:
-        acts = [c for c in of.problem.candidates if c not in without.problem.candidates]
+        acts = [c for c in of.problem.candidates if c.effect not in without.problem.families]
         return ground.compared(of, best.size - without.size if family in unseen else None) + rarity(acts)
 
     fits |= {n: _foremost(n, f, fits.get(n), partial(speaks, family=n)) for n, f in twin.items()}

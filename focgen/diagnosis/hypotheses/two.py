@@ -15,6 +15,7 @@ from focgen.diagnosis.belief.choice import beforehand
 from focgen.diagnosis.belief.further import Ground
 from focgen.diagnosis.fitting.fit import Fit, Weighing, fit
 from focgen.diagnosis.hypotheses.accept import AcceptanceCriteria
+from focgen.diagnosis.hypotheses.anew import looked_anew
 from focgen.diagnosis.hypotheses.search import Ranking, rank
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import CandidateEffect
@@ -32,6 +33,7 @@ def two_at_once(
         return None
     for one in list(first.best.values())[:_TRIED]:
         second = rank(one.problem, one.vector, one.problem.untried(candidates))
+        second = looked_anew(first.base, second, candidates, asked.surroundings)
         if second.winner is not None:
             found.append((second.best[second.winner], second))
     found = [(both, second) for both, second in found if _explains(both, first)]
