@@ -290,7 +290,7 @@ def explain_all(
         x = freed(segment, made, foretold, left, noise)
         ways = None
         if is_explained(left, noise):
-            rest = slow_rest(segment, x, response, left)
+            rest = slow_rest(segment, x, response)
             ways = np.column_stack([input_covariance(e), rest])
         unsure = strays(segment, made, response, left, noise)
         x = x + problem.simulate(problem.level(e.best.vector)) - made

@@ -62,12 +62,9 @@ def strays(segment: Segment, simulated: np.ndarray, response: float, left: float
     return Strays(none, _slow(segment, backwards, response, left))
 
 
-def slow_rest(segment: Segment, taken: np.ndarray, response: float, left: float) -> np.ndarray:
+def slow_rest(segment: Segment, taken: np.ndarray, response: float) -> np.ndarray:
     """The slow parts (n, k), ever slower, of what the output has beyond what is ``taken`` for it (n,): what a
-    form lacks of the rig is in them, and the next stage's output has that, too. None where inputs predict a
-    share ``left`` of the residual beyond chance: then :func:`strays` allows for as much."""
-    if left > NUMBERS.chance:
-        return np.zeros((len(segment.y), 0))
+    form lacks of the rig is in them, and the next stage's output has that, too."""
     rest = segment.parts(segment.y - taken)
     return np.column_stack([_slowed(segment, rest, response, part) for part in _SLOW])
 
