@@ -17,7 +17,7 @@ PARTS, QUIET = 20, 0.02  # of a sample; of the excess, below which the spool is 
 
 def spool(commands):
     """A spool that breaks loose beyond a band, slides in its own time, and is held where kinetic friction
-    does: where a command is slow it slips and is held, where it is quick it follows. No form has both."""
+    does. Where a command is slow it slips and is held, and where it is quick it follows. No form has both."""
     x, loose, found = 0.0, False, []
     for u in commands:
         for _ in range(PARTS):

@@ -36,11 +36,16 @@ def asked(monkeypatch, both, found):
     )
     beside = {"bend": (), "creep": (both,), "friction": ()}
 
-    def rank(problem, vector, candidates):
-        return ranking(None, *beside[problem.families[0]])
+    def rank(problem, vector, candidates):  # each as it was fitted while nothing stood for the other
+        return ranking(
+            None, *(left(45.0, *f.problem.families, told=0.9) for f in beside[problem.families[0]])
+        )
+
+    def looked_anew(first, second, candidates, surroundings):
+        return ranking(None, *(both for _ in second.best))
 
     monkeypatch.setattr(two, "rank", rank)
-    monkeypatch.setattr(two, "looked_anew", lambda first, second, candidates, surroundings: second)
+    monkeypatch.setattr(two, "looked_anew", looked_anew)
     monkeypatch.setattr(two, "fit", lambda problem, vector, weighing, iterations: known[id(problem)])
     fits = (gap, bend, creep, friction, both, found or bend)
     known = {id(f.problem): f for f in fits}

@@ -72,7 +72,8 @@ class Ground:
         weighing: Weighing,
         surroundings: Surroundings,
     ) -> Ground:
-        """``first``: the fit without any effect, ``tried``: with one more than ``base``."""
+        """``first``: the fit without any effect, ``tried``: with one more than ``base``, the others maybe in
+        other forms."""
         best = min([base, *tried], key=lambda f: f.sse)
         told = _told(best)
         count = len(base.innovations)

@@ -1,13 +1,15 @@
 """What was found before, looked for anew beside what was found last.
 
 The numbers of the first effect were found while nothing stood for the second, so it took part of what that
-makes; and a form that is right beside the second may have been the worse one alone. No slope leads from there
-to where both are right, as with a valve's band. So each earlier effect is started again beside the last.
+makes. A form that is right beside the second may have been the worse one alone. No slope leads from there to
+where both are right, as with a valve's band. So each earlier effect is started again, in every form of its
+family, beside the last.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -26,18 +28,23 @@ from focgen.diagnosis.hypotheses.search import (
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
 
-_TRIED = 4  # fits of families beside which it is looked
+_TRIED = 4  # families: beside so many of the foremost the earlier effects are looked for
+_FAR, _NEAR = (
+    0.25,
+    10.0,
+)  # beside none with less than this part of the foremost one's evidence, less these nats
 _FITTED = 10  # iterations
 
 
 def looked_anew(
     first: Fit, ranking: Ranking, candidates: Sequence[CandidateEffect], surroundings: Surroundings
 ) -> Ranking:
-    """The ranking with what its base has found before looked for anew, among the forms of its families in
-    ``candidates``, beside the foremost of those that are ranked; the same where the likeliest leaves little
-    that inputs predict. ``first``: the fit without any effect; ``surroundings``: of the misfit."""
-    foremost = list({f.sse: f for f in ranking.best.values()}.values())[:_TRIED]
-    base = ranking.base
+    """The ranking with the earlier effects, those of its base, looked for anew beside the foremost families.
+
+    It is the same where inputs predict little of what the likeliest leaves, and where nothing likelier is
+    found. ``first``: the fit without any effect; ``candidates``: the forms; ``surroundings``: of the misfit.
+    """
+    base, foremost = ranking.base, _foremost(ranking)
     if not foremost or not base.problem.candidates or foremost[0].predictable_share < NUMBERS.left:
         return ranking
     weighing, likelier = Weighing(ranking.ar), []
@@ -49,49 +56,62 @@ def looked_anew(
             likelier += [other] if ground.compared(other) > ground.compared(of) else []
     if not likelier:
         return ranking
-    known = (*ranking.best.values(), *ranking.left)
-    whole = [f for f in known if len(f.innovations) == len(base.innovations)]
-    return finish(base, [*likelier, *whole], ranking.errors)
+    found = finish(base, [*likelier, *ranking.best.values()], ranking.errors)
+    return replace(found, left=(*found.left, *ranking.left))
+
+
+def _foremost(ranking: Ranking) -> list[Fit]:
+    """The foremost fits; of twins, which leave the same, the first."""
+    found: dict[float, Fit] = {}
+    top = max(ranking.gain.values(), default=0.0)
+    for name, of in ranking.best.items():
+        if ranking.gain[name] > _FAR * top - _NEAR:
+            found.setdefault(of.sse, of)
+    return list(found.values())[:_TRIED]
 
 
 def _anew(of: Fit, candidates: Sequence[CandidateEffect]) -> Fit:
     """A fit, or a likelier one with other numbers or forms of the effects ahead of its last. A form that
     jumps does so from sample to sample, and is tried on all of them."""
     problem = of.problem
-    factor = 1 if any(c.form.jumps for c in problem.candidates) else coarseness(problem)
+    earlier = problem.candidates[:-1]
+    forms = [[c for c in candidates if may_be(c, own)] for own in earlier]
+    jumps = any(c.form.jumps for c in (*problem.candidates, *(c for each in forms for c in each)))
+    factor = 1 if jumps else coarseness(problem)
     thin = problem.thinned(factor)
     best = before = fit(thin, thin.stretched(of.vector, 1.0 / factor), WHITE, _FITTED)
-    for place in range(len(problem.candidates) - 1):
-        own = problem.candidates[place]
-        for form in (c for c in candidates if may_be(c, own)):
-            other = _replaced(best, place, form)
-            best = other if other is not None and evidence(other, best) > 0.0 else best
+    for place, each in enumerate(forms):
+        best = _replaced(best, place, each)
     return of if best is before else on_all(best, problem, factor)
 
 
 def may_be(form: CandidateEffect, own: CandidateEffect) -> bool:
-    """Whether a form may be what stands for its family: one that wanders would follow anything."""
+    """Whether a form may take the place of another: one of the same family, in the same place. One that
+    wanders takes the place of none that does not, for it would follow anything."""
     alike = (form.effect, form.stage, form.form.rarer) == (own.effect, own.stage, own.form.rarer)
     return alike and form.form.wanders == own.form.wanders
 
 
-def _replaced(of: Fit, place: int, form: CandidateEffect) -> Fit | None:
-    """A fit with this form in the place of one of its effects, from the form's own start values."""
+def _replaced(of: Fit, place: int, forms: Sequence[CandidateEffect]) -> Fit:
+    """A fit, or the likeliest with one of these forms in the ``place`` of one of its effects, from the form's
+    own start values beside the others, which are fitted without it."""
     problem, own = of.problem, list(_shares(of.problem, of.vector))
     kept = [c for i, c in enumerate(problem.candidates) if i != place]
-    if form in kept:
-        return None
-    head = of.vector[: problem.head]
     bare = problem.with_candidates(kept)
-    base = np.concatenate([head, *(v for i, v in enumerate(own) if i != place)])
-    found = best_start(bare, footings(bare, base), form)
-    if found is None:
-        return None
-    shares = list(_shares(found.problem, found.vector))
-    shares.insert(place, shares.pop())
-    kept.insert(place, form)
-    vector = np.concatenate([found.vector[: problem.head], *shares])
-    return fit(problem.with_candidates(kept), vector, WHITE, _FITTED, leader=of)
+    start = np.concatenate([of.vector[: problem.head], *(v for i, v in enumerate(own) if i != place)])
+    from_ = footings(bare, fit(bare, start, WHITE, _FITTED).vector) + footings(bare, start)
+    best = of
+    for form in (f for f in forms if f not in kept):
+        found = best_start(bare, from_, form)
+        if found is None:
+            continue
+        shares = list(_shares(found.problem, found.vector))
+        shares.insert(place, shares.pop())
+        whole = problem.with_candidates([*kept[:place], form, *kept[place:]])
+        vector = np.concatenate([found.vector[: problem.head], *shares])
+        other = fit(whole, vector, WHITE, _FITTED, leader=best)
+        best = other if evidence(other, best) > 0.0 else best
+    return best
 
 
 def _shares(problem: Problem, vector: np.ndarray) -> Sequence[np.ndarray]:

@@ -259,11 +259,23 @@ def without_family(of: Fit, name: str, weighing: Weighing, known: Sequence[Fit] 
 def left_out(
     of: Fit, candidates: Sequence[CandidateEffect], weighing: Weighing, known: Sequence[Fit] = ()
 ) -> Fit:
-    """``of`` without ``candidates``, fitted again, or what is ``known`` of the same, if that is better: what
-    was fitted beside an effect may be far from what it is without, as a valve's band that jumps."""
+    """``of`` without ``candidates``, fitted again, or what is ``known`` of the same families, if that is
+    likelier. What was fitted beside an effect may be far from what it is without, as a valve's band that
+    jumps, and a form that is right beside it the worse one without."""
     whole, vector = _without(of, candidates)
     found = [f.vector for f in known if f.problem.candidates == whole.candidates]
-    return min((fit(whole, s, weighing, 8) for s in (vector, *found)), key=lambda f: f.cost)
+    best = min((fit(whole, s, weighing, 8) for s in (vector, *found)), key=lambda f: f.cost)
+    for other in (f for f in known if _in_other_forms(f.problem, whole)):
+        again = fit(other.problem, other.vector, weighing, 8)
+        best = again if evidence(again, best) > 0.0 else best
+    return best
+
+
+def _in_other_forms(problem: Problem, of: Problem) -> bool:
+    """Whether a problem has the same effects in the same places as another, and other forms of them."""
+    places = ([(c.effect, c.stage, c.form.rarer) for c in p.candidates] for p in (problem, of))
+    first, second = map(sorted, places)
+    return first == second and problem.candidates != of.candidates
 
 
 def without(of: Fit, candidates: Sequence[CandidateEffect], weighing: Weighing) -> Fit:

@@ -37,7 +37,7 @@ _HOPELESS = 2.0  # beyond this many times the best sum of squares a form is drop
 @dataclass(frozen=True, eq=False)
 class Ranking:
     """``base`` and what each family adds to it, all under the same noise model ``ar``; ``best`` by family,
-    likeliest first.
+    likeliest first. Beside a later family the effects of ``base`` may have other forms.
 
     ``errors``: by family, the root-mean-square residual with its best form, over that of ``base`` (a quick
     fit's where no more was worth while). ``gain`` are nats of evidence over ``base``: half the

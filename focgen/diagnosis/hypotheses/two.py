@@ -2,7 +2,7 @@
 
 Effects are added one by one, and what stands beside a second one may look like anything: alone, each leaves
 most of what the other makes. So where the first effect leaves much that inputs predict, or none was found,
-the likeliest families are each taken for granted once, and asked for another.
+the likeliest families are each taken for granted once, asked for another, and looked for anew beside that.
 """
 
 from __future__ import annotations

@@ -63,8 +63,11 @@ def strays(segment: Segment, simulated: np.ndarray, response: float, left: float
 
 
 def slow_rest(segment: Segment, taken: np.ndarray, response: float) -> np.ndarray:
-    """The slow parts (n, k), ever slower, of what the output has beyond what is ``taken`` for it (n,): what a
-    form lacks of the rig is in them, and the next stage's output has that, too."""
+    """The slow parts (n, k), ever slower, of what the output has beyond what is ``taken`` for it (n,).
+
+    What a form lacks of the rig is in them, and the next stage's output has that, too. :func:`strays` allows
+    for what is quicker, and for what no part of these shows.
+    """
     rest = segment.parts(segment.y - taken)
     return np.column_stack([_slowed(segment, rest, response, part) for part in _SLOW])
 
