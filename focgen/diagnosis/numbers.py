@@ -170,7 +170,7 @@ class Numbers:
         "mean square of the loudest response time over the usual one, of the same; "
         "where the rig moves over where it rests, of what is left",
         "ratio",
-        "healthy rigs: at most 4, and 1.5 where it moves; of 109 sure and right names one above 3.5; "
+        "healthy rigs: at most 4, and 1.5 where it moves; named rightly: once 7.2, of 109 more at most 3.5; "
         "outside: 7.6, 17 and 20",
     )
     tonal: float = _number(

@@ -23,16 +23,13 @@ from focgen.diagnosis.hypotheses.search import (
     evidence,
     finish,
     footings,
+    keeps_up,
     on_all,
 )
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
 
 _TRIED = 4  # families: beside so many of the foremost the earlier effects are looked for
-_FAR, _NEAR = (
-    0.25,
-    10.0,
-)  # beside none with less than this part of the foremost one's evidence, less these nats
 _FITTED = 10  # iterations
 
 
@@ -65,7 +62,7 @@ def _foremost(ranking: Ranking) -> list[Fit]:
     found: dict[float, Fit] = {}
     top = max(ranking.gain.values(), default=0.0)
     for name, of in ranking.best.items():
-        if ranking.gain[name] > _FAR * top - _NEAR:
+        if keeps_up(ranking.gain[name], top):
             found.setdefault(of.sse, of)
     return list(found.values())[:_TRIED]
 

@@ -73,14 +73,15 @@ def rank(problem: Problem, base: np.ndarray, candidates: Sequence[CandidateEffec
     factor = coarseness(problem)
     ground, tried, errors = _coarse(problem, base, candidates, factor)
     top = evidence(tried[0], ground) if tried else 0.0
-    kept = (
-        tried[:2]
-        if top < _NOTHING
-        else [t for t in _chosen(tried) if evidence(t, ground) > _FAR * top - _NEAR]
-    )
+    kept = tried[:2] if top < _NOTHING else [t for t in _chosen(tried) if keeps_up(evidence(t, ground), top)]
     full = [on_all(t, problem, factor) for t in (ground, *kept)]
     found = finish(full[0], full[1:], errors)
     return replace(found, left=(*found.left, *(t for t in tried if t not in kept)))
+
+
+def keeps_up(gain: float, top: float) -> bool:
+    """Whether evidence is near enough to that of the foremost one to be looked at further."""
+    return gain > _FAR * top - _NEAR
 
 
 def likeliest_on_all(problem: Problem, base: np.ndarray, candidates: Sequence[CandidateEffect]) -> Fit | None:
