@@ -10,12 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
 from focgen.diagnosis.belief.further import Ground, Surroundings
 from focgen.diagnosis.fitting.fit import WHITE, Fit, Weighing, fit
+from focgen.diagnosis.hypotheses.rivals import without
 from focgen.diagnosis.hypotheses.search import (
     Ranking,
     best_start,
@@ -27,7 +27,7 @@ from focgen.diagnosis.hypotheses.search import (
     on_all,
 )
 from focgen.diagnosis.numbers import NUMBERS
-from focgen.diagnosis.problem.problem import CandidateEffect, Problem
+from focgen.diagnosis.problem.problem import CandidateEffect
 
 _TRIED = 4  # families: beside so many of the foremost the earlier effects are looked for
 _FITTED = 10  # iterations
@@ -92,26 +92,18 @@ def may_be(form: CandidateEffect, own: CandidateEffect) -> bool:
 def _replaced(of: Fit, place: int, forms: Sequence[CandidateEffect]) -> Fit:
     """A fit, or the likeliest with one of these forms in the ``place`` of one of its effects, from the form's
     own start values beside the others, which are fitted without it."""
-    problem, own = of.problem, list(_shares(of.problem, of.vector))
-    kept = [c for i, c in enumerate(problem.candidates) if i != place]
-    bare = problem.with_candidates(kept)
-    start = np.concatenate([of.vector[: problem.head], *(v for i, v in enumerate(own) if i != place)])
-    from_ = footings(bare, fit(bare, start, WHITE, _FITTED).vector) + footings(bare, start)
-    best = of
+    bare = without(of, [of.problem.candidates[place]], WHITE)
+    problem, kept, best = bare.problem, list(bare.problem.candidates), of
+    alone = fit(problem, bare.vector, WHITE, _FITTED)
+    from_ = footings(problem, alone.vector) + footings(problem, bare.vector)
     for form in (f for f in forms if f not in kept):
-        found = best_start(bare, from_, form)
+        found = best_start(problem, from_, form)
         if found is None:
             continue
-        shares = list(_shares(found.problem, found.vector))
+        shares = found.problem.shares(found.vector)
         shares.insert(place, shares.pop())
         whole = problem.with_candidates([*kept[:place], form, *kept[place:]])
         vector = np.concatenate([found.vector[: problem.head], *shares])
         other = fit(whole, vector, WHITE, _FITTED, leader=best)
         best = other if evidence(other, best) > 0.0 else best
     return best
-
-
-def _shares(problem: Problem, vector: np.ndarray) -> Sequence[np.ndarray]:
-    """The part of a vector that each candidate effect has."""
-    ends = np.cumsum([problem.head, *(len(c.form.parameters) for c in problem.candidates)])
-    return [vector[a:b] for a, b in pairwise(ends)]

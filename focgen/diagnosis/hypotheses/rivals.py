@@ -284,11 +284,7 @@ def without(of: Fit, candidates: Sequence[CandidateEffect], weighing: Weighing) 
 
 
 def _without(of: Fit, candidates: Sequence[CandidateEffect]) -> tuple[Problem, np.ndarray]:
-    kept, vector, place = [], [of.vector[: of.problem.head]], of.problem.head
-    for candidate in of.problem.candidates:
-        count = len(candidate.form.parameters)
-        if candidate not in candidates:
-            kept.append(candidate)
-            vector.append(of.vector[place : place + count])
-        place += count
-    return of.problem.with_candidates(kept), np.concatenate(vector)
+    shares = zip(of.problem.candidates, of.problem.shares(of.vector))
+    stay = [(c, share) for c, share in shares if c not in candidates]
+    vector = [of.vector[: of.problem.head], *(share for _, share in stay)]
+    return of.problem.with_candidates([c for c, _ in stay]), np.concatenate(vector)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -202,6 +203,11 @@ class Problem:
         most = max(len(p.starts) for p in parameters)
         rows = [[p.starts[min(i, len(p.starts) - 1)] for p in parameters] for i in range(most)]
         return [np.array([np.log(v) if p.log else v for p, v in zip(parameters, row)]) for row in rows]
+
+    def shares(self, vector: np.ndarray) -> list[np.ndarray]:
+        """The entries of a vector that each candidate effect has."""
+        ends = np.cumsum([self.head, *(len(c.form.parameters) for c in self.candidates)])
+        return [vector[a:b] for a, b in pairwise(ends)]
 
     def values(self, vector: np.ndarray) -> list[tuple[float, ...]]:
         """The candidate effects' parameters in the log's units."""
