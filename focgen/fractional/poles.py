@@ -135,7 +135,11 @@ class _Sector:
         radii = np.linspace(self.low, self.high, max(8, math.ceil(density * (self.high - self.low))))
         angles = np.linspace(0.0, self.angle, math.ceil(density * self.angle))
         grid = radii[:, None] + 1j * angles
-        level = np.pad(self.relative(grid), 1, constant_values=np.inf)
+        # e^(r + iθ)α is a product: so many exponentials are taken once for each radius and each angle
+        sizes = self.coefficients * np.exp(np.outer(radii, self.orders))
+        turns = np.exp(1j * np.outer(angles, self.orders))
+        share = np.abs(sizes @ turns.T) / np.abs(sizes).sum(axis=-1)[:, None]
+        level = np.pad(share, 1, constant_values=np.inf)
         inner = level[1:-1, 1:-1]
         around = [
             level[1 + i : level.shape[0] - 1 + i, 1 + j : level.shape[1] - 1 + j]

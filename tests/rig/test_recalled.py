@@ -6,6 +6,7 @@ the kernel t^(α − 1)/Γ(α).
 Red when what an earlier experiment left is lost, or is put into a rig that was reset.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 from focgen.diagnosis.hypotheses.initial import begun_session
+from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.logs.read import in_session_order
 from focgen.rig.files import read_rig
@@ -248,6 +250,26 @@ def test_rigs_that_each_began_at_rest_have_no_pauses(tmp_path: Path) -> None:
         ]
         told = begun_session(rig, reset)
         assert [(log.start, dict(log.begins)) for log in told] == [(log.start, {}) for log in reset]
+
+
+def _behind(rig: Rig, logs: Sequence[Experiment], slower: float) -> tuple[Rig, list[Experiment]]:
+    """The rig behind a regulator, and the logs with a command that a ``slower`` one made their input of."""
+    regulated = replace(rig, regulator=TransferFunction([(1.0, 0.0)], [(0.2, 1.0), (1.0, 0.0)]))
+    found = []
+    for log in logs:
+        x = log["pressure"]
+        command = x + slower * 0.2 * np.diff(x, append=x[-1]) / H
+        found.append(replace(log, signals={"command": command, **log.signals}))
+    return replace(regulated, signals=replace(rig.signals, command="u_V")), found
+
+
+@pytest.mark.parametrize("slower", [1.0, 8.0])
+def test_a_stage_that_fits_badly_hides_no_past_of_another(tmp_path: Path, slower: float) -> None:
+    """The squares of all stages added up are those of the worst one: what the output tells of the past is a
+    hundredth of what a regulator leaves that is eight times slower than given."""
+    plain, logs = _rig(tmp_path), _own_clocks(_logs(rest=10.0))
+    rig, logs = _behind(plain, logs, slower)
+    assert [log.before("pressure").known for log in begun_session(rig, logs)] == [False, True, True]
 
 
 def _cut(at: int) -> list[Experiment]:

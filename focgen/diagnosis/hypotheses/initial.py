@@ -30,6 +30,7 @@ _AGAIN = 2  # times that the rig is refitted and the begins told anew
 _ROUNDS = 6  # of a refit
 _LEVEL = 0.1  # of the input's largest magnitude: by what a level before may be off, a standard deviation
 _TIME = 1.3  # times: by what the time of a step before may be
+_EXACT = 1e-12  # of the output's level squared: less is no noise, but rounding
 _SEEN = 1e-3  # of the output's largest magnitude, in root mean square: less does not show
 
 
@@ -62,12 +63,13 @@ def begun_with(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment]) -
 
 
 def _refitted(rig: Rig, logs: Sequence[Experiment]) -> tuple[Rig, float]:
-    """The rig with its nominal parameters fitted to the logs, and the mean squares that segments leave."""
-    roles, left = cuts(logs), 0.0
+    """The rig with its nominal parameters fitted to the logs, and the product of the mean squares that its
+    segments leave, as their likelihood has it: a sum would be that of the segment that fits worst."""
+    roles, left = cuts(logs), 1.0
     for entry, exit in pairwise(roles):
         problem = problem_of(rig, make(logs, entry, exit), logs)
         found = fit(problem, problem.nominal(), WHITE, _ROUNDS)
-        left += found.sse / len(found.innovations)
+        left *= max(found.sse / len(found.innovations), _EXACT)
         rig = problem.rig(found.vector) if len(problem.nominal_start) else rig
     return rig, left
 
