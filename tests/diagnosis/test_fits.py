@@ -3,6 +3,7 @@
 Red when work is done twice, or what is left out to save it changes an answer.
 """
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.hypotheses.search import best_start, footings
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
 from focgen.diagnosis.problem.segments import make
-from focgen.rig.effects import library
+from focgen.rig.effects import Form, Parameter, library
 from tests.diagnosis_rig import RIG, session
 
 
@@ -60,6 +61,20 @@ def test_a_unit_is_not_moved_for_its_derivative(problem, monkeypatch):
     assert len(simulated) == np.sum(high - low > 1e-6) < len(vector)
     assert not np.any(rows[-2]) and np.any(rows[-3])
     np.testing.assert_array_equal(rows[-1], now)
+
+
+def test_a_rig_that_runs_away_fits_nothing_and_is_nothing_to_warn_of(problem):
+    """Users saw numpy's warning of a trial that no fit took."""
+    force = Parameter("force", lower=1.0, upper=1e3, starts=(500.0,), zero=0.0)
+    away = Form("away", "load", (force,), lambda x, v, run: np.sinh(1e6 * v[0] * x) - np.exp(1e6 * v[0] * x))
+    candidate = CandidateEffect("gain_nonlinearity", away, "actuator")
+    whole = problem.with_candidates([candidate])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        made = whole.simulate(np.r_[whole.nominal(), 500.0])
+        assert not np.all(np.isfinite(made))
+        found = best_start(problem, footings(problem, problem.nominal()), candidate)
+    assert found.sse > 1e3 * fit(problem, problem.nominal(), WHITE).sse
 
 
 def test_a_fit_far_behind_is_left_early_within_a_hundredth_of_what_it_is_behind(problem, monkeypatch):

@@ -243,13 +243,15 @@ class Problem:
 
     def simulate(self, vector: np.ndarray, probe: bool = False) -> np.ndarray:
         """The segment's output (n,), in the log's units; a ``probe`` leaves nothing to the simulations that
-        follow, which go on from another vector."""
+        follow, which go on from another vector. A plant that runs away with these numbers leaves no finite
+        ones, which no fit takes: that is no fault to warn of."""
         chain = Chain(self.rig(vector), self.placed(vector), self.memory, probe)
         own, segment = len(self.nominal_start), self.segment
         gauges, off, begun, zeros = self._parted(vector[own + 1 : self.head])
         x = self._entered(float(vector[own]), off, probe)
         fed = segment.fed
-        made = chain.run(x, segment.stages[0], segment.stages[-1], fed.run, segment.between)
+        with np.errstate(over="ignore", invalid="ignore"):
+            made = chain.run(x, segment.stages[0], segment.stages[-1], fed.run, segment.between)
         made = self._read(made if segment.readings is None else made[segment.readings], *gauges)
         made = made + segment.loose @ begun if len(begun) and begun.any() else made
         return made + self._uneven(zeros) if len(zeros) and zeros.any() else made
