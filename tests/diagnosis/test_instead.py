@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from focgen.diagnosis.hypotheses.explain import Explanation
-from focgen.diagnosis.verdict import instead, summary
+from focgen.diagnosis.verdict import conclude, instead, summary
 from focgen.diagnosis.verdict.instead import Instead, sound_part
 
 DOUBTS = ("changed_at_once", "logged_late", "clocks_apart", "unevenly_paced", "taken_up", "unsteady")
@@ -92,6 +92,22 @@ def test_whatever_is_there_instead_the_sound_part_stands_where_it_explains(monke
     monkeypatch.setattr(summary, "is_unknown", lambda e: unknown)
     sound = [c.rivals[0].effect for part in summary.sound_parts([e]).values() for c in part.causes]
     assert sound == ([] if unknown else ["dead_zone"])
+
+
+@pytest.mark.parametrize(
+    "other, unsure",
+    [(Fills(CREEPS, 3.0), True), (Fills(CREEPS, -3.0), False), (Instead(CREEPS, 3.0), False), (None, False)],
+    ids=["no form", "unlikely", "at one moment", "nothing"],
+)
+def test_beside_what_nobody_has_a_form_of_no_name_is_sure(monkeypatch, other, unsure):
+    """A clamp that slips for good was `softening` at 0.93, and instead of the drift beside it was something
+    else (0.63). What changes at one moment has a form, and leaves the rest as it is."""
+    e = explained(monkeypatch, "creep", "dead_zone")
+    part = replace(explained(monkeypatch, "dead_zone"), whole=e)
+    monkeypatch.setattr(conclude, "acts_besides", lambda e: False)
+    monkeypatch.setattr(conclude, "doubts", lambda of: (None, other) if of is e else ())
+    assert conclude.something_unknown_acts(part) == unsure
+    assert not conclude.something_unknown_acts(e)
 
 
 def test_of_one_cause_there_is_no_part(monkeypatch):

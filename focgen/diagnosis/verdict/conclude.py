@@ -28,6 +28,7 @@ from focgen.diagnosis.verdict.cautions import (
 from focgen.diagnosis.verdict.confidence import tied
 from focgen.diagnosis.verdict.evidence import Evidence
 from focgen.diagnosis.verdict.improvement import Improvement
+from focgen.diagnosis.verdict.instead import is_likelier
 from focgen.diagnosis.verdict.moments import another
 from focgen.diagnosis.verdict.moves import far_moves
 from focgen.diagnosis.verdict.nominal import likelier_nominal, nominal_alone, unnamed
@@ -162,13 +163,22 @@ def _found(
     rigs = summary.rigs
     kept, sure = tied(cause.rivals)
     sure = sure * NUMBERS.unlikely if e.freed else sure  # numbers far off explain the same
-    sure = sure * NUMBERS.unlikely if summary.stands_for_more or acts_besides(e) else sure
+    sure = sure * NUMBERS.unlikely if summary.stands_for_more or something_unknown_acts(e) else sure
     trust = min(trust, NUMBERS.smaller) if at_their_ends(cause.rivals[0]) else trust
     sure = sure * _lasting(e, cause) * min(_beside(e, cause), trust)
     total = summary.total or Improvement(0.0, (0.0, 0.0))
     lost = _share_lost(cause, rigs, logs, summary.squares, summary.floor, total)
     candidates = tuple(_candidate(r, float(p), rigs.fitted) for r, p in zip(kept, sure))
     return Found(cause.rivals[0].stage, candidates, lost.value, lost.interval)
+
+
+def something_unknown_acts(e: Explanation) -> bool:
+    """Whether something acts in the segment that nobody has a form of: it pushes the rig, or it is likelier
+    than a part of what was found. The other part may stand for it, too."""
+    beside = doubts(e.whole) if e.whole else ()
+    return acts_besides(e) or any(
+        other is not None and other.fills and is_likelier(other) for other in beside
+    )
 
 
 def _lasting(e: Explanation, cause: Cause) -> float:
