@@ -13,6 +13,7 @@ import pytest
 
 from focgen.diagnosis.fitting.fit import WHITE, Fit, Weighing, fit
 from focgen.diagnosis.fitting.folds import folds, foreseen, foretold
+from focgen.diagnosis.hypotheses import rivals
 from focgen.diagnosis.hypotheses.foretelling import foretelling
 from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.hypotheses.search import evidence
@@ -67,16 +68,35 @@ def test_what_two_runs_tell_differently_is_left_out(seed):
     assert families(foretelling(both, WHITE)) == ["dead_zone"]
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_two_effects_that_are_there_stay(seed):
+def dead_and_creeping(seed: int) -> Fit:
+    """Both effects fitted to what they make."""
     logs = steps(seed, 6.0, 6.0, 6.0, 6.0, 6.0)
     problem = problem_for(logs, ("dead_zone", "soft"), ("creep", "power"))
     true = fitted(problem).vector
     true[-len(problem.candidates[1].form.parameters) :] = problem.starts(problem.candidates[1])[0]
     noise = np.random.default_rng(seed).normal(size=len(problem.segment.y))
     seen = replace(problem.segment, y=problem.simulate(true) + NOISE * noise)
-    again = fitted(replace(problem, segment=seen, memory={}))
-    assert families(foretelling(again, WHITE)) == ["dead_zone", "creep"]
+    return fitted(replace(problem, segment=seen, memory={}))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_two_effects_that_are_there_stay(seed):
+    assert families(foretelling(dead_and_creeping(seed), WHITE)) == ["dead_zone", "creep"]
+
+
+def test_a_fit_that_is_stuck_makes_no_effect_vain(monkeypatch):
+    """Without the effect it leaves more than its parts foretell, where the search knows of a better one: a dead
+    zone beside a rail was lost so."""
+    both = dead_and_creeping(1)
+    alone = [fitted(both.problem.with_candidates([c])) for c in both.problem.candidates]
+
+    def stuck(problem: Problem, start: np.ndarray, weighing: Weighing, iterations: int) -> Fit:
+        known = any(start is of.vector for of in alone)
+        return fit(problem, start, weighing, iterations if known else 0)
+
+    monkeypatch.setattr(rivals, "fit", stuck)
+    assert len(families(foretelling(both, WHITE))) == 1
+    assert families(foretelling(both, WHITE, alone)) == ["dead_zone", "creep"]
 
 
 def test_parts_are_neighbouring_experiments_or_quarters():

@@ -344,7 +344,7 @@ def _sifted(last: Ranking, asked: AcceptanceCriteria, known: Sequence[Fit]) -> t
 
     def sifted(weighing: Weighing) -> Fit:
         best = _dropped(last.base, weighing, asked.threshold, known)
-        return realigned(best if asked.granted else foretelling(best, weighing), weighing)
+        return realigned(best if asked.granted else foretelling(best, weighing, known), weighing)
 
     if _much_left(last.base):
         return sifted(WHITE), WHITE

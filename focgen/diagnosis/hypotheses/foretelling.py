@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,15 +14,20 @@ from focgen.diagnosis.numbers import NUMBERS
 from focgen.rig.effects import library
 
 
-def foretelling(best: Fit, weighing: Weighing) -> Fit:
+def foretelling(best: Fit, weighing: Weighing, known: Sequence[Fit] = ()) -> Fit:
     """``best`` without the effects that, on parts of the session which a fit does not see, leave
     :attr:`~focgen.diagnosis.numbers.Numbers.stays` of what they close where it does; the vainest is left out
-    first, and one is kept. What a rounding or a wander does is foretold by nothing."""
+    first, and one is kept. What a rounding or a wander does is foretold by nothing.
+
+    ``known``: fits from the search. A fit without an effect that is stuck far from its least leaves more than
+    parts of it foretell, and then the effect seems to close what it does not."""
     if not _asked(best):
         return best
     error = foretold(best, weighing)
     while names := _asked(best):
-        vainest = min((_Left.of(name, best, error, weighing) for name in names), key=lambda each: each.share)
+        vainest = min(
+            (_Left.of(name, best, error, weighing, known) for name in names), key=lambda each: each.share
+        )
         if vainest.share >= 1.0 - NUMBERS.stays:
             break
         best, error = vainest.without, vainest.error
@@ -46,9 +52,9 @@ class _Left:
     share: float
 
     @classmethod
-    def of(cls, name: str, best: Fit, error: float, weighing: Weighing) -> _Left:
+    def of(cls, name: str, best: Fit, error: float, weighing: Weighing, known: Sequence[Fit]) -> _Left:
         """``error``: the mean square that is foretold with the family."""
-        without = without_family(best, name, weighing)
+        without = without_family(best, name, weighing, known)
         fitted = float(np.mean(judged_error(without) ** 2)) - float(np.mean(judged_error(best) ** 2))
         alone = foretold(without, weighing)
         return cls(without, alone, (alone - error) / fitted if fitted > 0.0 else 0.0)
