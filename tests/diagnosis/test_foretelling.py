@@ -85,7 +85,7 @@ def test_two_effects_that_are_there_stay(seed):
 
 
 def test_a_fit_that_is_stuck_makes_no_effect_vain(monkeypatch):
-    """Without the effect it leaves more than its parts foretell, where the search knows of a better one: a dead
+    """Without the effect it leaves more than its parts foretell, and the search knows of a better one: a dead
     zone beside a rail was lost so."""
     both = dead_and_creeping(1)
     alone = [fitted(both.problem.with_candidates([c])) for c in both.problem.candidates]
