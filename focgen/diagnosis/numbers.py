@@ -98,7 +98,7 @@ class Numbers:
         "odds",
         "fitted, on steps of 52 pairs and 81 singles",
         "1 pair fewer found",
-        "at 0.001: 3 of 40 pairs more found, and a second effect of eleven names beside a hair dryer's dead time",
+        "at 0.001: 3 of 40 pairs more found, and a second effect of eleven names in a hair dryer",
     )
     again: float = _number(
         0.1,

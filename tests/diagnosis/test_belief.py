@@ -321,7 +321,7 @@ def test_a_colour_goes_with_the_effects_that_it_was_made_with(monkeypatch, first
     of["all"].predictable_share, of["fewer"].predictable_share = first, after
     kept = of["fewer"] if first != after else of["all"]
     monkeypatch.setattr(explain, "_dropped", lambda best, weighing, *_: kept)
-    monkeypatch.setattr(explain, "foretelling", lambda best, weighing: best)
+    monkeypatch.setattr(explain, "foretelling", lambda best, weighing, known: best)
     monkeypatch.setattr(explain, "realigned", lambda best, weighing: best)
     last = SimpleNamespace(base=of["all"], ar=np.array([1.0, -0.9]))
     best, weighing = explain._sifted(last, SimpleNamespace(threshold=12.0, granted=False), ())
