@@ -138,7 +138,7 @@ class _Sector:
         # e^(r + iθ)α is a product: so many exponentials are taken once for each radius and each angle
         sizes = self.coefficients * np.exp(np.outer(radii, self.orders))
         turns = np.exp(1j * np.outer(angles, self.orders))
-        share = np.abs(sizes @ turns.T) / np.abs(sizes).sum(axis=-1)[:, None]
+        share = np.abs((sizes[:, None] * turns).sum(axis=-1)) / np.abs(sizes).sum(axis=-1)[:, None]
         level = np.pad(share, 1, constant_values=np.inf)
         inner = level[1:-1, 1:-1]
         around = [
