@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from focgen.diagnosis.hypotheses.explain import Explanation
-from focgen.diagnosis.verdict import conclude, instead, summary
+from focgen.diagnosis.verdict import conclude, instead, summary, unsteady
 from focgen.diagnosis.verdict.instead import Instead, sound_part
 
 DOUBTS = ("changed_at_once", "logged_late", "clocks_apart", "unevenly_paced", "taken_up", "unsteady")
@@ -106,6 +106,8 @@ def test_beside_what_nobody_has_a_form_of_no_name_is_sure(monkeypatch, other, un
     part = replace(explained(monkeypatch, "dead_zone"), whole=e)
     monkeypatch.setattr(conclude, "acts_besides", lambda e: False)
     monkeypatch.setattr(conclude, "doubts", lambda of: (None, other) if of is e else ())
+    fills = (other,) if other and other.fills else ()
+    monkeypatch.setattr(unsteady, "unsteady", lambda of: fills if of is e else ())
     assert conclude.something_unknown_acts(part) == unsure
     assert not conclude.something_unknown_acts(e)
 

@@ -28,13 +28,13 @@ from focgen.diagnosis.verdict.cautions import (
 from focgen.diagnosis.verdict.confidence import tied
 from focgen.diagnosis.verdict.evidence import Evidence
 from focgen.diagnosis.verdict.improvement import Improvement
-from focgen.diagnosis.verdict.instead import is_likelier
 from focgen.diagnosis.verdict.moments import another
 from focgen.diagnosis.verdict.moves import far_moves
 from focgen.diagnosis.verdict.nominal import likelier_nominal, nominal_alone, unnamed
 from focgen.diagnosis.verdict.sizes import at_their_ends, estimates
 from focgen.diagnosis.verdict.summary import Summary, doubts, sorted_out, sound_parts
 from focgen.diagnosis.verdict.unexplained import acts_besides, disturbed
+from focgen.diagnosis.verdict.unsteady import is_unsteady
 from focgen.diagnosis.verdict.where import locate, stage_shares
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import notes_of
@@ -175,10 +175,7 @@ def _found(
 def something_unknown_acts(e: Explanation) -> bool:
     """Whether something acts in the segment that nobody has a form of: it pushes the rig, or it is likelier
     than a part of what was found. The other part may stand for it, too."""
-    beside = doubts(e.whole) if e.whole else ()
-    return acts_besides(e) or any(
-        other is not None and other.fills and is_likelier(other) for other in beside
-    )
+    return acts_besides(e) or (e.whole is not None and is_unsteady(e.whole))
 
 
 def _lasting(e: Explanation, cause: Cause) -> float:
