@@ -80,7 +80,7 @@ def without_curvature(log):
     )
 
 
-QUICK = {("actuator", "hysteresis", 1), ("actuator", "gain_nonlinearity", 1)}
+QUICK = {("actuator", "gain_nonlinearity", 1)}
 CASES = [
     pytest.param(*case, marks=() if case in QUICK else pytest.mark.long)
     for case in product(("actuator", "sensor"), SENSORS, (1, 2))

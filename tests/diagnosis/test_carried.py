@@ -36,7 +36,8 @@ def session(seed):
     return found
 
 
-@pytest.mark.parametrize("clock", ["one", pytest.param("of its own", marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("clock", ["one", "of its own"])
 def test_a_creep_that_goes_on_is_no_drift(clock):
     actuator = LinearActuator(TransferFunction([(2.05, 0.0)], [(0.52, 1.0), (1.0, 0.0)]))
     rig = Rig("finger", H, Signals("t", "y", pressure="p"), actuator)

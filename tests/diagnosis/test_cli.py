@@ -99,7 +99,11 @@ def test_plan_needs_no_data(made, capsys):
 
 
 @pytest.mark.parametrize(
-    "effect", ["fixed_point", "short_memory", pytest.param("output_saturation", marks=pytest.mark.long)]
+    "effect",
+    [
+        "fixed_point",
+        *(pytest.param(e, marks=pytest.mark.long) for e in ("short_memory", "output_saturation")),
+    ],
 )
 def test_the_controller_departs_by_what_was_done_to_it(tmp_path, capsys, effect):
     """A closed loop of the trials' generator: rig, logs, and the ideal controller."""

@@ -31,12 +31,13 @@ def said(found):
     return [note for note in found.notes if "clocks of their own" in note]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "rate, roles, seed",
     [
-        pytest.param(0.004, (), 1, marks=pytest.mark.long),
-        pytest.param(-0.004, (), 2, marks=pytest.mark.long),
-        pytest.param(0.004, ("pressure",), 3, marks=pytest.mark.long),
+        (0.004, (), 1),
+        (-0.004, (), 2),
+        (0.004, ("pressure",), 3),
         (-0.004, ("pressure", "curvature"), 4),
     ],
 )
@@ -48,12 +49,15 @@ def test_columns_of_two_loggers_are_no_drift(rate, roles, seed):
     assert float(note.split("%")[-2].split("(")[-1]) == pytest.approx(0.4, abs=0.02)
 
 
-@pytest.mark.parametrize("effect", [{"drift": 4e-4}, {"vent": 0.8}, {"delay": 6}])
+@pytest.mark.parametrize(
+    "effect", [pytest.param({"drift": 4e-4}, marks=pytest.mark.long), {"vent": 0.8}, {"delay": 6}]
+)
 def test_what_lies_in_the_rig_is_not_taken_for_it(effect):
     found = diagnose(RIG, session(5, roles=("pressure",), **effect), pictures=False)
     assert found.verdict in ("named", "set") and not said(found)
 
 
+@pytest.mark.long
 def test_a_command_that_stands_still_tells_no_clock():
     """Sooner or later it is the same: the division by what another clock changes ended the diagnosis."""
     t, rng = 0.01 * np.arange(1500), np.random.default_rng(0)

@@ -23,6 +23,7 @@ def test_noise_that_goes_round_the_loop_is_no_gap(seed, roles):
     assert found.verdict in ("none", "parameters") and not found.causes
 
 
+@pytest.mark.long
 def test_a_hum_that_goes_round_the_loop_is_no_resonance():
     """The command carries it, and a mode of that frequency would make the one from the other."""
     found = diagnose(RIG, closed_session(1, hum=0.03))

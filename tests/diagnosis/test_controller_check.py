@@ -78,6 +78,7 @@ def test_short_memory(length, begins):
     assert found.causes[0][0].value == pytest.approx(length, rel=0.05) and found.causes[0][0].share > 0.97
 
 
+@pytest.mark.long
 def test_a_long_memory_is_found_in_a_long_log():
     ref, meas = (np.tile(part, 10) for part in inputs())
     stated = replace(CONTROLLER, length=20000)

@@ -51,7 +51,10 @@ def session(step: float, noise: float, seed: int) -> list[Experiment]:
     return logs
 
 
-@pytest.mark.parametrize("step, seed, told", [(8.0, 1, None), (12.0, 2, ("sensor_quantization",))])
+@pytest.mark.parametrize(
+    "step, seed, told",
+    [pytest.param(8.0, 1, None, marks=pytest.mark.long), (12.0, 2, ("sensor_quantization",))],
+)
 def test_steps_of_a_third_and_half_of_the_span_are_steps(step, seed, told):
     found = diagnose(HEATER, session(step, 0.1, seed), only=told)
     (cause,) = found.causes
@@ -174,12 +177,13 @@ def behind_steps(half: float, dead: float, seed: int) -> list[Experiment]:
     return logs
 
 
-@pytest.mark.parametrize("seed", (1, pytest.param(2, marks=pytest.mark.long)))
+@pytest.mark.long
+@pytest.mark.parametrize("seed", (1, 2))
 @pytest.mark.parametrize(
     "half, dead, right",
     [
         (4.0, 0.0, {"hysteresis", "sensor_hysteresis"}),
-        pytest.param(0.0, 3.0, {"dead_zone"}, marks=pytest.mark.long),
+        (0.0, 3.0, {"dead_zone"}),
         (0.0, 0.0, None),
     ],
 )
@@ -274,9 +278,8 @@ def read_late(part, lag, seed):
     return [replace(log, signals={**log.signals, "output": late(log["output"], step, lag)}) for log in logs]
 
 
-@pytest.mark.parametrize(
-    "part, lag, seed", [(0.05, 0.3, 1), pytest.param(0.08, 0.2, 2, marks=pytest.mark.long)]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("part, lag, seed", [(0.05, 0.3, 1), (0.08, 0.2, 2)])
 def test_steps_that_go_on_late_are_no_loop_beside_them(part, lag, seed, tmp_path):
     logs = read_late(part, lag, seed)
     found = diagnose(FINGER, logs, out=tmp_path / "gap", pictures=False)
@@ -294,7 +297,8 @@ def test_a_loop_that_is_taken_for_granted_stays():
     assert "sensor_hysteresis" in [cause.candidates[0].effect for cause in found.causes]
 
 
-@pytest.mark.parametrize("step", [1.2, pytest.param(0.8, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("step", [1.2, 0.8])
 def test_a_loop_wider_than_a_step_stays_beside_it(step):
     rng, logs = np.random.default_rng(5), session(0.5, 0.0, 5)
     for i, log in enumerate(logs):

@@ -49,7 +49,8 @@ def session(seed, **what):
     return logs
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [1, 2])
 def test_a_cut_out_is_nothing_for_sure(seed):
     found = diagnose(HEATER, session(seed, cut=52.0, back=46.0), pictures=False)
     sure = [c.confidence for cause in found.causes for c in cause.candidates]

@@ -50,7 +50,7 @@ def test_parameters_a_little_off_are_refitted_all_the_same():
     [
         ("transport_delay", {"delay": 4}),
         pytest.param("dead_zone", {"zone": 0.045}, marks=pytest.mark.long),
-        ("hysteresis", {"slip": 0.35}),
+        pytest.param("hysteresis", {"slip": 0.35}, marks=pytest.mark.long),
     ],
 )
 def test_one_effect_is_named_as_without_cuts(effect, case):

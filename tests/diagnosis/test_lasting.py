@@ -61,11 +61,12 @@ def session(seed, where, size):
     ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "where, effect",
-    [("actuator", "hysteresis"), pytest.param("sensor", "sensor_hysteresis", marks=pytest.mark.long)],
+    [("actuator", "hysteresis"), ("sensor", "sensor_hysteresis")],
 )
-@pytest.mark.parametrize("size", [0.03, pytest.param(0.1, marks=pytest.mark.long)])
+@pytest.mark.parametrize("size", [0.03, 0.1])
 def test_a_loop_left_by_the_last_log_is_that_and_no_more(where, effect, size):
     """It had a folded reading beside it, or shared a set, or was `unknown`."""
     found = diagnose(RIG, session(1, where, size), pictures=False)

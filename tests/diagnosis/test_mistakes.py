@@ -57,7 +57,8 @@ def exchanged(_, signals):
     return signals | {"curvature": signals["output"], "output": signals["curvature"]}
 
 
-@pytest.mark.parametrize("time", (0.6, pytest.param(1.0 / 6.0, marks=pytest.mark.long)))
+@pytest.mark.long
+@pytest.mark.parametrize("time", (0.6, 1.0 / 6.0))
 def test_a_reading_ahead_of_what_it_reads_is_no_effect(time):
     """A relaxation that overshoots comes closest, and was sure at 0.95 beside a warning of the columns."""
     rig = replace(RIG, sensor=TransferFunction([(1.0, 0.0)], [(time, 1.0), (1.0, 0.0)]))
@@ -67,6 +68,7 @@ def test_a_reading_ahead_of_what_it_reads_is_no_effect(time):
     assert any("exchanged" in line for line in found.warnings)
 
 
+@pytest.mark.long
 def test_an_amplifier_that_is_switched_between_experiments_is_no_curve():
     logs = session(3)
     late = len(logs) // 2

@@ -162,6 +162,7 @@ def test_pump_vents_slowly_with_its_angle_logged_and_a_rig_from_the_log(tmp_path
     assert all((c.stage, c.candidates[0].effect) in BESIDE for c in others)
 
 
+@pytest.mark.long
 def test_pump_does_nothing_below_a_volt_or_two(tmp_path):
     """2 V give 2.9 kPa and each volt from 3 V on 10 more: a line that meets zero at 1.8 V."""
     rig, log = rig_and_log("tank", tmp_path)

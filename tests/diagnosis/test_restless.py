@@ -60,7 +60,8 @@ def test_a_damper_that_warms_is_not_the_rigs_own_numbers(seed):
     assert found.verdict == "unknown"
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [1, 2])
 def test_a_camera_that_loses_fast_motion_is_nothing_for_sure(seed):
     found = diagnose(RIG, session(seed, seen=blurred), pictures=False)
     sure = [c.confidence for cause in found.causes for c in cause.candidates]

@@ -95,7 +95,8 @@ def pulled(load: np.ndarray, sample: float) -> np.ndarray:
     return np.array(found)
 
 
-@pytest.mark.parametrize("seed", (1, pytest.param(2, marks=pytest.mark.long)))
+@pytest.mark.long
+@pytest.mark.parametrize("seed", (1, 2))
 def test_rubber_that_is_stiff_again_beyond_what_it_has_seen_is_softening(seed):
     sample, rng = 0.05, np.random.default_rng(seed)
     steps = np.r_[np.zeros(10), np.repeat((0.8, 0.0, 1.5, 0.8, 2.4, 0.8, 1.5, 0.0, 2.4, 0.4, 0.0), 60)]

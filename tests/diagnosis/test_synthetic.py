@@ -307,6 +307,7 @@ def test_where_nothing_explains_the_larger_part_of_a_gap_it_is_unknown():
     assert any("command to pressure: valve_asymmetry may be there as well" in note for note in found.notes)
 
 
+@pytest.mark.long
 def test_a_push_that_no_input_predicts_is_unknown_beside_what_is_clear():
     """Pushes far above the noise of the output."""
     found = pushed(0.0006)
@@ -392,6 +393,7 @@ def test_session_state_carries_on(drifting):
     assert rig.effects[0]["clock"] > 300
 
 
+@pytest.mark.long
 def test_noise_alone_gathers_little_evidence():
     explained = explain_all(RIG, session(11, zone=0.045), NUMBERS.nats)[1]
     candidates = [c for c in candidates_for(explained.segment, RIG) if c.form.seen is None][::3]

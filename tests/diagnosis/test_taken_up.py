@@ -29,12 +29,13 @@ def taking(role, part, seed=3, roles=("command", "pressure", "curvature", "outpu
 ALL = ("command", "pressure", "curvature", "output")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "role, part, roles",
     [
         ("command", 0.06, ("command", "output")),
-        pytest.param("pressure", -0.07, ALL, marks=pytest.mark.long),
-        pytest.param("command", 0.06, ALL, marks=pytest.mark.long),
+        ("pressure", -0.07, ALL),
+        ("command", 0.06, ALL),
     ],
 )
 def test_what_the_gauge_takes_up_is_unknown_and_said(role, part, roles):

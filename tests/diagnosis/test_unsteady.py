@@ -87,6 +87,7 @@ def earlier_when_full(most):
     return made
 
 
+@pytest.mark.long
 def test_a_delay_that_is_another_at_every_pressure_is_neither_a_valve_nor_a_delay():
     (e, *_) = explain_all(RIG, earlier_when_full(0.6), NUMBERS.nats, ["valve_asymmetry", "transport_delay"])
     doubts = {name: one for one in unsteady(e) for name in one.instead}

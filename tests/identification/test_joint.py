@@ -110,6 +110,7 @@ def trials(tau: float, seeds: range, step: float, end: float, levels=LEVELS, noi
     return errors, np.abs(errors) <= halves
 
 
+@pytest.mark.long
 def test_intervals_cover_the_truth_whatever_the_pressure_does():
     cells = [
         trials(tau, range(100 * cell, 100 * cell + 14), 0.05, 30.0, LEVELS[::2])

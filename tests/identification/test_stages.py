@@ -134,6 +134,7 @@ def test_the_papers_regulator_is_found_as_it_is_written():
     assert fit.up_down.one_line_will_do
 
 
+@pytest.mark.long
 def test_intervals_of_the_papers_regulator_in_a_few_seeds():
     fits = paper_fits(12)
     assert [fit.shape for fit in fits] == ["2p"] * 12

@@ -145,6 +145,7 @@ def per_tap(reads, core_name, steps):
     return instructions, (long.cycles.mean() - short.cycles.mean()) / taps
 
 
+@pytest.mark.long
 def test_a_tap_costs_the_slope_between_two_lengths(folders):
     """On the Cortex-M4 a multiplication, an addition, two loads and a share of the loop."""
     reads = folders["f32", 12], folders["f32", 38]

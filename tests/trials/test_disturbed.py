@@ -23,6 +23,7 @@ def case():
     return make_case(Assignment("none", (), "low"), "C", "short", np.random.default_rng(3))
 
 
+@pytest.mark.long
 def test_a_suite_of_disturbed_cases_plays_the_same_rigs(tmp_path):
     """Sealed logs and truth are those of "full" with the same seed; of what is given only the rig changes."""
     files = {}
