@@ -90,6 +90,22 @@ def test_repeats_are_found_by_the_input_and_its_past():
     assert not loaded
 
 
+def test_what_a_creep_may_remember_is_no_repeat():
+    """The rig of 2 s has long forgotten a hold that ended 40 s before; what creeps in it has not."""
+    steps = [0.0, 1.0, 0.0, 0.5, 0.0]
+    rests, held = np.zeros(400), np.ones(1200)
+    block = np.repeat(steps, 40)
+
+    def repeated(*between):
+        pressure = np.concatenate([rests, block, *between, rests, block])
+        log = Experiment("one", TS, {"pressure": pressure, "output": pressure}, 0.0)
+        found = repeats_of(make([log], "pressure", "output"), 2.0)
+        later = np.array(found.cells)[:, 0] >= len(pressure) - len(block)
+        return np.sum(np.any(found.again[:, later] == 1.0, axis=1))
+
+    assert repeated(np.zeros(1200)) > 10 and repeated(held) == 0
+
+
 def apart_means(repeats):
     pressure = np.concatenate([log["pressure"] for log in session([(0.2,), (0.9,)])])
     return np.array([pressure[a:b].mean() for a, b in repeats.cells])

@@ -18,7 +18,8 @@ from focgen.diagnosis.problem.segments import Segment
 
 _CELL = 0.25  # of the response: stretches over which means are taken,
 _MOST = 800  # and how many of them at most
-_PAST = (1, 3, 12, 48)  # ends, in cells back, of the pieces of the past that have to be alike, too
+_PAST = (1, 3, 12, 48, 192, 768)  # ends, in cells back, of the pieces of the past that have to be alike, too:
+# as far back as what creeps remembers, which is much longer than the rig itself
 _ALIKE = 0.04  # of the input's range: what counts as the same
 _LATER = 0.2  # of the session: what counts as later
 _FEW = 8  # repeated cells: fewer tell nothing
