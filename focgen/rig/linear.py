@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import cmath
+import math
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -29,6 +32,12 @@ from focgen.rig.modes import (
 )
 from focgen.rig.real_orders import modes_of
 from focgen.rig.rig import UNITY
+
+_SLOW = 0.03  # of a pole times the sample time, q: less is a series
+_STEP = tuple(1.0 / math.factorial(k + 1) for k in range(8))  # of (e^q − 1)/q
+_LINE = tuple(1.0 / (math.factorial(k) * (k + 2)) for k in range(8))  # of (e^q (q − 1) + 1)/q²
+_LARGEST = 700.0  # of an exponent
+_FEW = 2  # poles
 
 
 def run(
@@ -203,9 +212,11 @@ def discrete(transfer: TransferFunction, h: float, held: bool) -> tuple[Array, A
     if len(den) == 1:
         return num / den[0], np.ones(1)
     through = num[0] / den[0] if len(num) == len(den) else 0.0
-    poles = np.roots(den).astype(complex)
+    poles = _roots(den)
     if coincide(poles):
         return _by_exponential(num, den, h, held)
+    if len(poles) <= _FEW:
+        return _of_few(num, den, [complex(p) for p in poles], h, held)
     a, past, now = _held(poles, residues(num, den, poles), h, held)
     whole = np.poly(a)
     b = through * whole.astype(complex)
@@ -214,6 +225,62 @@ def discrete(transfer: TransferFunction, h: float, held: bool) -> tuple[Array, A
         b[: len(rest)] += now[i] * rest
         b[1 : len(rest) + 1] += past[i] * rest
     return b.real, whole.real
+
+
+def _roots(den: Array) -> Complex:
+    """The roots of a polynomial, highest power first; of the second order by the formula that cancels
+    nothing."""
+    if len(den) == 2:
+        return np.array([-den[1] / den[0]], complex)
+    if len(den) != 3:
+        return np.roots(den).astype(complex)
+    a, b, c = map(float, den)
+    q = -0.5 * (b + cmath.sqrt(b * b - 4.0 * a * c) * (1.0 if b >= 0.0 else -1.0))
+    return np.array([q / a, c / q if q else 0.0], complex)
+
+
+def _of_few(num: Array, den: Array, poles: Sequence[complex], h: float, held: bool) -> tuple[Array, Array]:
+    """As :func:`discrete`, of one or two ``poles``: what most stages have, in numbers one by one. A fit makes
+    it anew at every step, and arrays of one or two take ten times as long."""
+    through = float(num[0] / den[0]) if len(num) == len(den) else 0.0
+    above, whole, b = [float(c) for c in num[::-1]], [1.0 + 0j], [0j] * (len(poles) + 1)
+    kept = [_grown(p * h) for p in poles]
+    for a in kept:
+        whole = [x - a * y for x, y in zip([*whole, 0j], [0j, *whole])]
+    for i, p in enumerate(poles):
+        others = [q for k, q in enumerate(poles) if k != i]
+        apart = math.prod((p - q for q in others), start=1.0 + 0j)
+        residue = _summed(p, above) / (float(den[0]) * apart)
+        past, now = _counted(p * h, residue * h, held)
+        rest = [1.0 + 0j, *(-a for k, a in enumerate(kept) if k != i)]
+        for k, r in enumerate(rest):
+            b[k] += now * r
+            b[k + 1] += past * r
+    return np.array([(x + through * y).real for x, y in zip(b, whole)]), np.array([x.real for x in whole])
+
+
+def _counted(q: complex, residue: complex, held: bool) -> tuple[complex, complex]:
+    """What the past and the present input of a mode count that is e^q as large a sample later. Of a slow mode
+    the formulas would cancel most of their digits."""
+    if abs(q) < _SLOW:
+        gain, past = _summed(q, _STEP), _summed(q, _LINE)
+    else:
+        a = _grown(q)
+        gain, past = (a - 1.0) / q, (a * (q - 1.0) + 1.0) / (q * q)
+    return (residue * gain, 0j) if held else (residue * past, residue * (gain - past))
+
+
+def _grown(q: complex) -> complex:
+    """e^q, infinite where no number is as large."""
+    return cmath.exp(q) if q.real < _LARGEST else complex(math.inf)
+
+
+def _summed(q: complex, series: Sequence[float]) -> complex:
+    """A series in powers of ``q``, the lowest first."""
+    made = 0j
+    for coefficient in reversed(series):
+        made = made * q + coefficient
+    return made
 
 
 def residues(num: Array, den: Array, poles: Complex) -> Complex:
@@ -226,10 +293,9 @@ def residues(num: Array, den: Array, poles: Complex) -> Complex:
 
 def _held(poles: Complex, residues: Complex, h: float, held: bool) -> tuple[Complex, Complex, Complex]:
     """What is left of each mode after ``h`` s, and what the past and the present input count."""
-    a = np.exp(poles * h)
-    gain = np.where(poles == 0, h, (a - 1) / np.where(poles == 0, 1, poles))  # of a step over one sample
-    past = residues * gain if held else residues * h * _ramp(poles * h, a)
-    return a, past, np.zeros_like(past) if held else residues * gain - past
+    pairs = [_counted(p * h, r * h, held) for p, r in zip(poles.tolist(), residues.tolist())]
+    past, now = np.array(pairs, complex).reshape(-1, 2).T
+    return np.exp(poles * h), past, now
 
 
 @lru_cache(maxsize=512)
@@ -261,13 +327,6 @@ def _by_pulse(
     late = Convolution(transfer, h, "zero" if held else "linear", (1.0 - share) * h)
     pulse = late.run(np.eye(1, len(a) + 2, 1)[0])[1:]
     return np.convolve(a, pulse)[: len(a) + 1], a
-
-
-def _ramp(q: Complex, a: Complex) -> Complex:
-    """∫ (1 − t) e^{q (1 − t)} dt over 0 … 1: what the past sample of a linear input counts."""
-    small = np.abs(q) < 1e-3
-    safe = np.where(small, 1.0, q)
-    return np.where(small, 0.5 + q / 3 + q * q / 8, (a * (safe - 1) + 1) / safe**2)
 
 
 def coincide(poles: Complex) -> bool:
