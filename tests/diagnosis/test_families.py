@@ -42,16 +42,30 @@ def test_a_family_is_as_likely_as_its_forms_together():
 def test_an_effect_is_left_out_of_the_best_that_is_known_without_it():
     """A fit that set out from a hopeless place is no measure of what the other effect adds."""
     logs = session(4, noise=0.004)
-    forms = [("dead_zone", "hard", "actuator"), ("creep", "pole", "actuator")]
-    first, second = (CandidateEffect(e, form_of(e, f), stage) for e, f, stage in forms)
-    problem = problem_of(RIG, make(logs, "pressure", "curvature"), logs)
+    forms = [("valve_stiction", "stick"), ("leak", "laminar")]
+    first, second = (CandidateEffect(e, form_of(e, f), "regulator") for e, f in forms)
+    problem = problem_of(RIG, make(logs, "command", "pressure"), logs)
     alone, both = problem.with_candidates([first]), problem.with_candidates([first, second])
-    far = np.r_[problem.nominal(), 0.9, 0.1, np.log(12.0)]  # all of the range is dead: there is no slope
+    far = np.r_[problem.nominal(), 0.5, 0.1]  # it jumps from sample to sample: no slope leads to a small band
     stuck = fit(both, far, WHITE, 0)
-    known = fit(alone, np.r_[problem.nominal(), 0.02], WHITE)
+    known = fit(alone, np.r_[problem.nominal(), 0.003], WHITE)
     lost, found = (left_out(stuck, [second], WHITE, k) for k in ((), (known,)))
     assert lost.sse > 10.0 * known.sse
     assert found.sse == pytest.approx(known.sse, rel=1e-3) and found.problem.candidates == (first,)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_stays_is_fitted_to_its_least_wherever_the_effect_had_taken_it(seed):
+    """A fit that is stopped on its way leaves more, and what was left out seems to explain that."""
+    logs = session(4, noise=0.004)
+    forms = [("creep", "power", "actuator"), ("gain_drift", "linear", "actuator")]
+    first, second = (CandidateEffect(e, form_of(e, f), stage) for e, f, stage in forms)
+    both = problem_of(RIG, make(logs, "pressure", "curvature"), logs).with_candidates([first, second])
+    low, high = both.bounds()
+    anywhere = np.nan_to_num(low + (high - low) * np.random.default_rng(seed).uniform(size=len(low)))
+    alone = left_out(fit(both, anywhere, WHITE, 0), [second], WHITE)
+    assert alone.problem.candidates == (first,)
+    assert fit(alone.problem, alone.vector, WHITE, 200).sse > 0.999 * alone.sse
 
 
 def test_a_mass_that_does_not_swing_is_no_resonance():

@@ -18,6 +18,7 @@ from focgen.rig.effects import library
 
 _SWAPS = 3
 _NEAR = 6.0  # nats: of families that are further behind no further form is asked
+_TO_THE_END = 30  # iterations, of which a fit that is near its least takes one or two
 _MENDED = 3  # rivals that get a second form where the best has one
 
 
@@ -261,10 +262,13 @@ def left_out(
 ) -> Fit:
     """``of`` without ``candidates``, fitted again, or what is ``known`` of the same families, if that is
     likelier. What was fitted beside an effect may be far from what it is without, as a valve's band that
-    jumps, and a form that is right beside it the worse one without."""
+    jumps, and a form that is right beside it the worse one without. So may a rig's own numbers, which are
+    tried as given, too."""
     whole, vector = _without(of, candidates)
+    given = np.concatenate([whole.nominal(), vector[whole.head :]])
     found = [f.vector for f in known if f.problem.candidates == whole.candidates]
-    best = min((fit(whole, s, weighing, 8) for s in (vector, *found)), key=lambda f: f.cost)
+    best = min((fit(whole, s, weighing, 8) for s in (vector, given, *found)), key=lambda f: f.cost)
+    best = fit(whole, best.vector, weighing, _TO_THE_END)
     for other in (f for f in known if _in_other_forms(f.problem, whole)):
         again = fit(other.problem, other.vector, weighing, 8)
         best = again if evidence(again, best) > 0.0 else best
