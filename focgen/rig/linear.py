@@ -37,7 +37,6 @@ _SLOW = 0.03  # of a pole times the sample time, q: less is a series
 _STEP = tuple(1.0 / math.factorial(k + 1) for k in range(8))  # of (e^q − 1)/q
 _LINE = tuple(1.0 / (math.factorial(k) * (k + 2)) for k in range(8))  # of (e^q (q − 1) + 1)/q²
 _LARGEST = 700.0  # of an exponent
-_FEW = 2  # poles
 
 
 def run(
@@ -215,48 +214,41 @@ def discrete(transfer: TransferFunction, h: float, held: bool) -> tuple[Array, A
     poles = _roots(den)
     if coincide(poles):
         return _by_exponential(num, den, h, held)
-    if len(poles) <= _FEW:
-        return _of_few(num, den, [complex(p) for p in poles], h, held)
-    a, past, now = _held(poles, residues(num, den, poles), h, held)
-    whole = np.poly(a)
-    b = through * whole.astype(complex)
-    for i in range(len(poles)):
-        rest = np.atleast_1d(np.poly(np.delete(a, i)))
-        b[: len(rest)] += now[i] * rest
-        b[1 : len(rest) + 1] += past[i] * rest
-    return b.real, whole.real
+    return _put_together(poles.tolist(), residues(num, den, poles).tolist(), through, h, held)
+
+
+def _put_together(
+    poles: Sequence[complex], weights: Sequence[complex], through: float, h: float, held: bool
+) -> tuple[Array, Array]:
+    """Numerator and denominator of modes, in numbers one by one: a fit makes them anew at every step, and
+    arrays of one or two take several times as long."""
+    kept = [_grown(p * h) for p in poles]
+    whole = _product(kept)
+    b = [through * w for w in whole]
+    for i, (p, weight) in enumerate(zip(poles, weights)):
+        past, now = _counted(p * h, weight * h, held)
+        for k, rest in enumerate(_product([*kept[:i], *kept[i + 1 :]])):
+            b[k] += now * rest
+            b[k + 1] += past * rest
+    return np.array(b, complex).real, np.array(whole, complex).real
+
+
+def _product(roots: Sequence[complex]) -> list[complex]:
+    """The polynomial 1 − r z^-1 times the same of the others, in powers of z^-1."""
+    made = [1.0 + 0j]
+    for root in roots:
+        made = [x - root * y for x, y in zip([*made, 0j], [0j, *made])]
+    return made
 
 
 def _roots(den: Array) -> Complex:
     """The roots of a polynomial, highest power first; of the second order by the formula that cancels
     nothing."""
-    if len(den) == 2:
-        return np.array([-den[1] / den[0]], complex)
     if len(den) != 3:
-        return np.roots(den).astype(complex)
+        return np.roots(den).astype(complex) if len(den) > 2 else -np.asarray(den[1:] / den[0], complex)
     a, b, c = map(float, den)
     q = -0.5 * (b + cmath.sqrt(b * b - 4.0 * a * c) * (1.0 if b >= 0.0 else -1.0))
     return np.array([q / a, c / q if q else 0.0], complex)
-
-
-def _of_few(num: Array, den: Array, poles: Sequence[complex], h: float, held: bool) -> tuple[Array, Array]:
-    """As :func:`discrete`, of one or two ``poles``: what most stages have, in numbers one by one. A fit makes
-    it anew at every step, and arrays of one or two take ten times as long."""
-    through = float(num[0] / den[0]) if len(num) == len(den) else 0.0
-    above, whole, b = [float(c) for c in num[::-1]], [1.0 + 0j], [0j] * (len(poles) + 1)
-    kept = [_grown(p * h) for p in poles]
-    for a in kept:
-        whole = [x - a * y for x, y in zip([*whole, 0j], [0j, *whole])]
-    for i, p in enumerate(poles):
-        others = [q for k, q in enumerate(poles) if k != i]
-        apart = math.prod((p - q for q in others), start=1.0 + 0j)
-        residue = _summed(p, above) / (float(den[0]) * apart)
-        past, now = _counted(p * h, residue * h, held)
-        rest = [1.0 + 0j, *(-a for k, a in enumerate(kept) if k != i)]
-        for k, r in enumerate(rest):
-            b[k] += now * r
-            b[k + 1] += past * r
-    return np.array([(x + through * y).real for x, y in zip(b, whole)]), np.array([x.real for x in whole])
 
 
 def _counted(q: complex, residue: complex, held: bool) -> tuple[complex, complex]:
@@ -285,10 +277,11 @@ def _summed(q: complex, series: Sequence[float]) -> complex:
 
 def residues(num: Array, den: Array, poles: Complex) -> Complex:
     """What each of the ``poles`` (k,), all different, counts in num/den, highest power first: (k,)."""
-    made: Complex = np.polyval(num, poles) / (
-        den[0] * np.array([np.prod(p - np.delete(poles, i)) for i, p in enumerate(poles)])
+    above, first, every = num.tolist()[::-1], float(den[0]), poles.tolist()
+    apart = (
+        math.prod((p - q for k, q in enumerate(every) if k != i), start=1.0 + 0j) for i, p in enumerate(every)
     )
-    return made
+    return np.array([_summed(p, above) / (first * others) for p, others in zip(every, apart)], complex)
 
 
 def _held(poles: Complex, residues: Complex, h: float, held: bool) -> tuple[Complex, Complex, Complex]:
@@ -303,10 +296,10 @@ def _discrete_between(transfer: TransferFunction, h: float, held: bool, share: f
     """As :func:`discrete`, but the response at the ``share`` of the way from the sample before to each."""
     num, den = coefficients(transfer.num), coefficients(transfer.den)
     through = num[0] / den[0] if len(num) == len(den) else 0.0
-    poles = np.roots(den).astype(complex)
+    poles = _roots(den)
     if coincide(poles):
         return _by_pulse(transfer, _by_exponential(num, den, h, held)[1], h, held, share)
-    weights = residues(num, den, poles) if len(poles) else np.zeros(0, complex)
+    weights = residues(num, den, poles)
     a, past, now = _held(poles, weights, h, held)
     decay, before, after = _held(poles, weights, share * h, held)
     whole, line = np.atleast_1d(np.poly(a)), after.sum() + through
