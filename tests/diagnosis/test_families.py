@@ -18,7 +18,7 @@ from focgen.diagnosis.diagnose import diagnose
 from focgen.diagnosis.fitting.fit import WHITE, fit
 from focgen.diagnosis.hypotheses.explain import candidates_for
 from focgen.diagnosis.hypotheses.nuisances import problem_of
-from focgen.diagnosis.hypotheses.rivals import left_out
+from focgen.diagnosis.hypotheses.rivals import at_its_least, left_out
 from focgen.diagnosis.problem.problem import CandidateEffect
 from focgen.diagnosis.problem.segments import make
 from focgen.diagnosis.verdict import summary
@@ -63,7 +63,7 @@ def test_what_stays_is_fitted_to_its_least_wherever_the_effect_had_taken_it(seed
     both = problem_of(RIG, make(logs, "pressure", "curvature"), logs).with_candidates([first, second])
     low, high = both.bounds()
     anywhere = np.nan_to_num(low + (high - low) * np.random.default_rng(seed).uniform(size=len(low)))
-    alone = left_out(fit(both, anywhere, WHITE, 0), [second], WHITE)
+    alone = at_its_least(left_out(fit(both, anywhere, WHITE, 0), [second], WHITE), WHITE)
     assert alone.problem.candidates == (first,)
     assert fit(alone.problem, alone.vector, WHITE, 200).sse > 0.999 * alone.sse
 

@@ -262,17 +262,21 @@ def left_out(
 ) -> Fit:
     """``of`` without ``candidates``, fitted again, or what is ``known`` of the same families, if that is
     likelier. What was fitted beside an effect may be far from what it is without, as a valve's band that
-    jumps, and a form that is right beside it the worse one without. So may a rig's own numbers, which are
-    tried as given, too."""
+    jumps, and a form that is right beside it the worse one without."""
     whole, vector = _without(of, candidates)
-    given = np.concatenate([whole.nominal(), vector[whole.head :]])
     found = [f.vector for f in known if f.problem.candidates == whole.candidates]
-    best = min((fit(whole, s, weighing, 8) for s in (vector, given, *found)), key=lambda f: f.cost)
-    best = fit(whole, best.vector, weighing, _TO_THE_END)
+    best = min((fit(whole, s, weighing, 8) for s in (vector, *found)), key=lambda f: f.cost)
     for other in (f for f in known if _in_other_forms(f.problem, whole)):
         again = fit(other.problem, other.vector, weighing, 8)
         best = again if evidence(again, best) > 0.0 else best
     return best
+
+
+def at_its_least(of: Fit, weighing: Weighing) -> Fit:
+    """A fit taken to its end, or from the rig's own numbers as given, if that is likelier: what was fitted
+    beside an effect may have taken them far from what they are without it."""
+    given = np.concatenate([of.problem.nominal(), of.vector[of.problem.head :]])
+    return min((fit(of.problem, s, weighing, _TO_THE_END) for s in (of.vector, given)), key=lambda f: f.cost)
 
 
 def _in_other_forms(problem: Problem, of: Problem) -> bool:

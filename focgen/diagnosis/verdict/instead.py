@@ -16,7 +16,7 @@ from focgen.diagnosis.fitting.fit import Fit, Weighing, square_by
 from focgen.diagnosis.fitting.predictability import predictability
 from focgen.diagnosis.hypotheses.converter import is_rounded
 from focgen.diagnosis.hypotheses.explain import Explanation
-from focgen.diagnosis.hypotheses.rivals import left_out, without
+from focgen.diagnosis.hypotheses.rivals import at_its_least, left_out, without
 from focgen.diagnosis.numbers import NUMBERS
 
 
@@ -70,8 +70,8 @@ def bases(e: Explanation) -> tuple[Fit, ...]:
         return ()
     candidates = e.best.problem.candidates
     families = sorted(e.best.problem.families) if len(e.best.problem.families) > 1 else ()
-    fewer = ([c for c in candidates if c.effect == effect] for effect in families)
-    return e.nominal, *(left_out(e.best, gone, Weighing(e.ar)) for gone in fewer)
+    fewer, weighing = ([c for c in candidates if c.effect == effect] for effect in families), Weighing(e.ar)
+    return e.nominal, *(at_its_least(left_out(e.best, gone, weighing), weighing) for gone in fewer)
 
 
 def gone(e: Explanation, base: Fit) -> frozenset[str]:
