@@ -6,6 +6,7 @@ Red when a stage that is slow beside the samples loses digits, or one that runs 
 import mpmath as mp
 import numpy as np
 import pytest
+from scipy.signal import cont2discrete
 
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig.linear import discrete
@@ -50,8 +51,8 @@ def test_a_stage_of_one_or_two_modes_is_exact_however_slow(seed):
         assert np.max(np.abs(found - true)) < 1e-9 * np.max(np.abs(true))
 
 
-def test_three_modes_are_the_product_of_one_and_two():
-    """Which go another way: in series, a step held at each sample is held in front of the first alone."""
+def test_three_modes_are_those_of_one_and_of_two():
+    """And held from sample to sample they answer as scipy's matrix exponential has it."""
     den = np.convolve([1.0, 3.0], [1.0, 0.8, 2.0])
     terms = [(float(c), float(3 - i)) for i, c in enumerate(den)]
     b, a = discrete(TransferFunction([(6.0, 0.0)], terms), 0.05, True)
@@ -59,6 +60,7 @@ def test_three_modes_are_the_product_of_one_and_two():
     poles = [discrete(TransferFunction([(1.0, 0.0)], part), 0.05, True)[1] for part in (one, two)]
     assert a == pytest.approx(np.convolve(*poles), abs=1e-14)
     assert b.sum() / a.sum() == pytest.approx(1.0, abs=1e-12)
+    assert b == pytest.approx(cont2discrete(([6.0], den), 0.05)[0][0], abs=1e-14)
 
 
 def test_what_no_number_holds_is_no_fault():
