@@ -146,7 +146,7 @@ def test_nothing_is_held_against_steps_that_the_best_fit_goes_without():
     coarse = SimpleNamespace(rivals=[SimpleNamespace(effect="sensor_quantization")])
     nothing = SimpleNamespace(problem=SimpleNamespace(families=(), candidates=()))
     assert bases.__wrapped__(SimpleNamespace(causes=(coarse,), whole=None)) == ()
-    bare = SimpleNamespace(causes=(), best=nothing, nominal=nothing, whole=None)
+    bare = SimpleNamespace(causes=(), best=nothing, nominal=nothing, whole=None, ar=())
     assert bases.__wrapped__(bare) == (nothing,)
 
 
