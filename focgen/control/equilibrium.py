@@ -47,6 +47,8 @@ def derived_ranges(rig: Rig) -> tuple[Ranges, tuple[str, ...]]:
         notes.append(f"{counts}; {_REGULATOR}")
     if read := read_alike(rig):
         notes.append(f"{read}; {_SENSOR}")
+    if isinstance(rig.actuator, Actuator) and rig.actuator.slip:
+        notes.append(rig.actuator.slip)
     command = given.command
     if command is None:
         merged = rig.regulator == UNITY and rig.signals.command is None

@@ -16,7 +16,7 @@ from focgen.logs.experiment import Experiment
 from focgen.logs.plausibility import Link, Signals
 from focgen.rig.effects import Run
 from focgen.rig.engine import Chain, between_of
-from focgen.rig.rig import UNITY, Rig
+from focgen.rig.rig import UNITY, Actuator, Rig
 from focgen.rig.stages import STAGES
 
 _ROLES = ("command", "pressure", "curvature", "output")  # before each stage, and after the last
@@ -36,6 +36,8 @@ def doubts(rig: Rig, experiments: Sequence[Experiment]) -> tuple[str, ...]:
     experiments = _enough([e for e in experiments if len(e) > 1])
     if not experiments:
         return ()
+    if isinstance(rig.actuator, Actuator) and rig.actuator.slip:
+        return (f"{rig.actuator.slip}; gain = [{max(rig.actuator.gain, key=abs):g}] for a constant gain?",)
     time = _time(rig, experiments)
     if time:
         return time

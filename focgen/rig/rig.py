@@ -79,6 +79,16 @@ class Actuator:
             made = (made + coefficient) * pressure
         return made[()]
 
+    @property
+    def slip(self) -> str:
+        """What a ``gain`` whose first coefficient is 0 comes to, which is seldom meant; "" for any other."""
+        power, first = next(((i, g) for i, g in enumerate(self.gain) if g), (0, 0.0))
+        if power == 0:
+            return ""
+        given = ", ".join(f"{g:g}" for g in self.gain)
+        line = f"K(0) is 0, so that what it settles at begins as {first:g} p^{power + 1}"
+        return f"the actuator's gain = [{given}] is K(p) = gain[0] + gain[1] p + …: {line}"
+
     @cached_property
     def dynamics(self) -> TransferFunction:
         """1/(T s^alpha + 1)."""

@@ -227,6 +227,20 @@ def test_an_absolute_pressure_within_the_range_is_told_by_the_command_at_rest():
     assert said(command, "p") == () and said(command + 2.0, "p_bar") == () and said(command, "p_kPa") == ()
 
 
+def test_a_gain_that_is_read_as_offset_and_slope_is_told(example, tmp_path, capsys):
+    """``gain = [0, 0.4]`` was read without a word, and settles at 0.4 p²."""
+    rig, logs = example
+    meant = replace(rig, actuator=replace(rig.actuator, gain=(0.0, 0.4)))
+    (warning,) = doubts(meant, logs)
+    assert "settles at begins as 0.4 p^2" in warning and "gain = [0.4] for a constant gain?" in warning
+    for sound in ((0.4,), (1e-9, 0.4), (0.0,)):
+        found = doubts(replace(rig, actuator=replace(rig.actuator, gain=sound)), logs)
+        assert not any("p^2" in warning for warning in found)
+    write_rig(meant, tmp_path / "rig.toml")
+    main(["design", str(tmp_path / "rig.toml"), "--out", str(tmp_path / "c.toml")])
+    assert "note: the actuator's gain = [0, 0.4] is K(p) = gain[0] + gain[1] p" in capsys.readouterr().out
+
+
 def test_units_by_name():
     assert unit_of("p_psi") == ("pressure", "psi") and unit_of("u [V]") == ("voltage", "V")
     assert unit_of("kappa_1pm") == ("curvature", "1/m") and unit_of("1/mm") == ("curvature", "1/mm")
