@@ -11,6 +11,8 @@ from focgen.diagnosis.fitting.fit import Fit
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import CandidateEffect
 
+NEAR = 6.0  # nats: of families that are further behind no further form is asked
+
 
 def prior(candidate: CandidateEffect, beside: Sequence[CandidateEffect]) -> float:
     """Log odds, before the data, of an effect ``beside`` others, or of another form of one that is there."""
@@ -34,6 +36,18 @@ def rarity(candidates: Sequence[CandidateEffect]) -> float:
 def _where(candidate: CandidateEffect) -> tuple[str, bool]:
     """The family, and whether it acts behind the dynamics of its stage."""
     return candidate.effect, candidate.form.rarer
+
+
+def foremost_forms(ground: Ground, tried: Sequence[Fit]) -> list[Fit]:
+    """Of every family the form that most speaks for, where that is within :data:`NEAR` of the foremost: one
+    of five values may leave least, and one of two be the likelier."""
+    best: dict[str, tuple[float, Fit]] = {}
+    for of in tried:
+        name, nats = of.problem.candidates[-1].effect, ground.roughly(of)
+        if name not in best or nats > best[name][0]:
+            best[name] = nats, of
+    top = max((nats for nats, _ in best.values()), default=0.0)
+    return [of for nats, of in best.values() if nats > top - NEAR]
 
 
 def likeliest(ground: Ground, tried: Sequence[Fit]) -> tuple[Fit, float]:

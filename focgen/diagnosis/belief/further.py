@@ -111,6 +111,11 @@ class Ground:
         not choose it."""
         return self.odds(of, most, speaks)
 
+    def roughly(self, of: Fit, rule: Rule = speaks_or_is_right) -> float:
+        """What speaks for a fit as it is, its nominal parameters kept no closer: enough to tell forms of one
+        family apart."""
+        return self._speaks(of, None, rule)
+
     def closer(self, of: Fit) -> float:
         """The nats of its odds that a fit has for nominal parameters closer to those given."""
         return max(self._best(self.base).prior_penalty - self._best(of).prior_penalty, 0.0)

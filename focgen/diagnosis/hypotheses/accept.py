@@ -14,7 +14,7 @@ from focgen.diagnosis.fitting.fit import Fit, Weighing
 from focgen.diagnosis.fitting.integrating import counted
 from focgen.diagnosis.hypotheses.converter import Converter
 from focgen.diagnosis.hypotheses.disturbance import disturbance
-from focgen.diagnosis.hypotheses.search import Ranking, family
+from focgen.diagnosis.hypotheses.search import Ranking, evidence, family
 from focgen.diagnosis.problem.smooth import Strays
 from focgen.rig.effects import library
 
@@ -53,7 +53,7 @@ def select(rankings: Sequence[Ranking], criteria: AcceptanceCriteria) -> Fit | N
         return None
     if criteria.granted and (missing := _missing(ranking)) is not None:
         return missing
-    tried = [f for n, f in ranking.best.items() if ranking.gain[n] > criteria.threshold]
+    tried = [f for f in ranking.on_all if evidence(f, ranking.base) > criteria.threshold]
     tried = [
         f for f in tried if counted(f, ranking.base) > criteria.threshold and not _goes_round(ranking.base, f)
     ]

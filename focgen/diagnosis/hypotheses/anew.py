@@ -53,8 +53,8 @@ def looked_anew(
             likelier += [other] if ground.compared(other) > ground.compared(of) else []
     if not likelier:
         return ranking
-    found = finish(base, [*likelier, *ranking.best.values()], ranking.errors)
-    return replace(found, left=(*found.left, *ranking.left))
+    found = finish(base, [*likelier, *ranking.on_all], ranking.errors)
+    return replace(found, left=(*found.left, *(f for f in ranking.left if f not in ranking.on_all)))
 
 
 def _foremost(ranking: Ranking) -> list[Fit]:

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from focgen.diagnosis.belief.choice import rarity
+from focgen.diagnosis.belief.choice import NEAR, rarity
 from focgen.diagnosis.belief.further import Ground, Surroundings
 from focgen.diagnosis.belief.standing import any_of, behind, holds, nominal_off
 from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, problem_residual
@@ -17,7 +17,6 @@ from focgen.diagnosis.problem.problem import CandidateEffect, Problem
 from focgen.rig.effects import library
 
 _SWAPS = 3
-_NEAR = 6.0  # nats: of families that are further behind no further form is asked
 _TO_THE_END = 30  # iterations, of which a fit that is near its least takes one or two
 _MENDED = 3  # rivals that get a second form where the best has one
 
@@ -165,7 +164,7 @@ def _foremost(family: str, twin: Fit, ranked: Fit | None, speaks: Callable[[Fit]
 def _near(odds: Mapping[str, float]) -> list[str]:
     """The families that further forms may bring to the front, or keep there."""
     best = max(odds.values())
-    return [name for name, o in odds.items() if o > best - _NEAR]
+    return [name for name, o in odds.items() if o > best - NEAR]
 
 
 def _other_forms(name: str, of: Fit, best: Fit, ranking: Ranking, beside: Beside) -> list[Fit]:

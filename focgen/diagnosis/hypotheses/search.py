@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from focgen.diagnosis.belief.choice import foremost_forms
+from focgen.diagnosis.belief.further import Ground, Surroundings
 from focgen.diagnosis.fitting.fit import WHITE, Fit, Known, Weighing, fit, innovations, jacobian
 from focgen.diagnosis.fitting.jumps import by_trying
 from focgen.diagnosis.fitting.noise import fit_ar
@@ -57,6 +59,12 @@ class Ranking:
         """The family of highest evidence."""
         return next(iter(self.best), None)
 
+    @property
+    def on_all(self) -> tuple[Fit, ...]:
+        """The families' best, and what further forms were fitted to every sample."""
+        whole = len(self.base.innovations)
+        return *self.best.values(), *(f for f in self.left if len(f.innovations) == whole)
+
 
 def evidence(of: Fit, against: Fit) -> float:
     """Nats of evidence of one fit over another on the same innovations (Schwarz's approximation), own
@@ -73,7 +81,8 @@ def rank(problem: Problem, base: np.ndarray, candidates: Sequence[CandidateEffec
     factor = coarseness(problem)
     ground, tried, errors = _coarse(problem, base, candidates, factor)
     top = evidence(tried[0], ground) if tried else 0.0
-    kept = tried[:2] if top < _NOTHING else [t for t in _chosen(tried) if keeps_up(evidence(t, ground), top)]
+    chosen = tried[:2] if top < _NOTHING else _chosen(tried, ground)
+    kept = [t for t in chosen if top < _NOTHING or keeps_up(evidence(t, ground), top)]
     full = [on_all(t, problem, factor) for t in (ground, *kept)]
     found = finish(full[0], full[1:], errors)
     return replace(found, left=(*found.left, *(t for t in tried if t not in kept)))
@@ -157,10 +166,10 @@ def _firsts(tried: Sequence[Fit]) -> list[Fit]:
     return list(found.values())
 
 
-def _chosen(tried: Sequence[Fit]) -> list[Fit]:
-    """The best form of every family, and the best forms altogether."""
-    first = _firsts(tried)
-    return first + [t for t in tried[:_DEEP] if t not in first]
+def _chosen(tried: Sequence[Fit], ground: Fit) -> list[Fit]:
+    """The best form of every family, the best forms altogether, and the forms that most speaks for."""
+    odds = Ground.of(ground, ground, tried, WHITE, Surroundings())
+    return list(dict.fromkeys([*_firsts(tried), *tried[:_DEEP], *foremost_forms(odds, tried)]))
 
 
 def _colour(leader: Fit) -> np.ndarray:
