@@ -21,7 +21,7 @@ from focgen.diagnosis.hypotheses.nuisances import may_be_more, uncertain
 from focgen.diagnosis.hypotheses.rivals import Beside, Cause, Examined, left_out, reexamined
 from focgen.diagnosis.hypotheses.search import Ranking, evidence, rank
 from focgen.diagnosis.hypotheses.seen_through import with_steps
-from focgen.diagnosis.hypotheses.two import two_at_once
+from focgen.diagnosis.hypotheses.two import TwoOthers, two_at_once, two_others
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
 from focgen.diagnosis.problem.segments import Segment, is_single, owner
@@ -46,7 +46,8 @@ class Explanation:
     """A segment explained. ``nominal``: its nominal parameters refitted; ``best``: with the effects. Each has
     a ``predictability`` of its residual from the inputs. ``errors``: by family, the root-mean-square
     residual with that effect alone, as a share of the refitted nominal's; ``converter``: the coarse one;
-    ``whole``: what this is the part of that is not in question, or no effect at all.
+    ``whole``: what this is the part of that is not in question, or no effect at all; ``others``: two effects
+    each that may be there instead of the one found.
     """
 
     segment: Segment
@@ -60,6 +61,7 @@ class Explanation:
     errors: dict[str, float]
     converter: Converter | None = None
     whole: Explanation | None = None
+    others: tuple[TwoOthers, ...] = ()
 
     @property
     def strained(self) -> bool:
@@ -217,6 +219,7 @@ def _explained(
     rankings = _or_two(rankings, candidates, asked)
     known = [f for r in rankings for f in (r.base, *r.best.values())]
     best, weighing = _sifted(rankings[-1], asked, known)
+    others = () if granted else two_others(best, rankings[0], candidates, weighing, asked)
     nominal = fit(problem, rankings[0].base.vector[: len(given)], weighing)
     errors = rankings[0].errors
     if remembers(best) and not asked.granted and (seen := unleft(best)) is not None:
@@ -242,6 +245,7 @@ def _explained(
         predictability(segment, nominal.weighed, response),
         errors,
         converter,
+        others=others,
     )
     return _off_by_itself(made, examined.off)
 

@@ -3,7 +3,7 @@ kept."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,7 +22,6 @@ from focgen.rig.rig import LinearActuator
 
 _COARSE = 5000  # samples of the first, coarse pass
 _LONG = 4000  # samples from which on a plant's own steps take longer than what is about them
-_QUICKEST = 4.0  # of them at least in a response
 _DEEP = 5  # how many forms are fitted to the end beside the families' best
 _QUICK = 0.3  # of the best quick fit's fall in the sum of squares: forms below are left at that
 _ADRIFT = 1.15  # of a fit's mean square without a colour
@@ -59,6 +58,16 @@ class Ranking:
         """The family of highest evidence."""
         return next(iter(self.best), None)
 
+    def firsts(self, without: Callable[[CandidateEffect], bool] = lambda c: False) -> list[Fit]:
+        """Every family's best on every sample, the likeliest first, and behind them those that fell behind by
+        themselves, which they may not beside another, by their error; ``without`` some forms."""
+        found, whole = dict[str, Fit](), self.base.problem
+        for of in (*self.best.values(), *sorted(self.left, key=lambda f: self.errors.get(family(f), np.inf))):
+            if family(of) not in found and not without(of.problem.candidates[-1]):
+                factor = round(whole.slack / of.problem.slack)
+                found[family(of)] = of if factor == 1 else on_all(of, whole, factor)
+        return list(found.values())
+
     @property
     def on_all(self) -> tuple[Fit, ...]:
         """The families' best, and what further forms were fitted to every sample."""
@@ -85,7 +94,8 @@ def rank(problem: Problem, base: np.ndarray, candidates: Sequence[CandidateEffec
     kept = [t for t in chosen if top < _NOTHING or keeps_up(evidence(t, ground), top)]
     full = [on_all(t, problem, factor) for t in (ground, *kept)]
     found = finish(full[0], full[1:], errors)
-    return replace(found, left=(*found.left, *(t for t in tried if t not in kept)))
+    fallen = [t for t in kept if family(t) not in found.best]
+    return replace(found, left=(*found.left, *fallen, *(t for t in tried if t not in kept)))
 
 
 def keeps_up(gain: float, top: float) -> bool:
@@ -135,13 +145,8 @@ def _in_steps(problem: Problem) -> bool:
 
 
 def coarseness(problem: Problem) -> int:
-    """How many neighbouring samples a coarse pass takes the mean of: of seldom readings none."""
-    segment = problem.segment
-    if segment.whole:
-        return 1
-    shortest = min(last - first for first, last in segment.run.spans)
-    seen = int(problem.references.clocks["response"] / segment.run.h / _QUICKEST)
-    return max(1, min(len(segment.y) // _COARSE, shortest // 20, seen))
+    """How many neighbouring samples a coarse pass takes the mean of."""
+    return max(1, min(len(problem.segment.y) // _COARSE, problem.coarsest))
 
 
 def on_all(of: Fit, problem: Problem, factor: int) -> Fit:

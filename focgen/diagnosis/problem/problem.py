@@ -21,6 +21,7 @@ _ZERO = 0.03  # of the level: an offset that is no fault
 _ALIGNED = 0.5  # of the slack of columns: what a standard deviation is; a delay is to be called one
 _OFF = 3.0  # standard deviations that an input may be off in each way
 _FAR_OFF = 20.0  # the same of a zero that no effect moves
+_QUICKEST = 4.0  # means of samples in a response at least
 _BASELINE = 0.005  # of the level: what the zero of a reading differs by from one experiment to the next
 
 
@@ -128,6 +129,16 @@ class Problem:
         """The same at the rows that a logger filled in, too."""
         whole = self.segment.whole
         return replace(self, segment=replace(whole, pace=self.segment.pace), memory={}) if whole else self
+
+    @property
+    def coarsest(self) -> int:
+        """Means of so many samples at most still show the response, and every experiment; of seldom readings
+        there are none."""
+        if self.segment.whole:
+            return 1
+        shortest = min(last - first for first, last in self.segment.run.spans)
+        seen = int(self.references.clocks["response"] / self.segment.run.h / _QUICKEST)
+        return max(1, min(shortest // 20, seen))
 
     def thinned(self, factor: int) -> Problem:
         """The same on means of ``factor`` samples at a time."""

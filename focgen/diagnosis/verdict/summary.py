@@ -22,6 +22,7 @@ from focgen.diagnosis.verdict.late import logged_late
 from focgen.diagnosis.verdict.moments import changed_at_once
 from focgen.diagnosis.verdict.predicted_improvement import paths, promised
 from focgen.diagnosis.verdict.taken_up import taken_up
+from focgen.diagnosis.verdict.two_instead import two_instead
 from focgen.diagnosis.verdict.uneven import unevenly_paced
 from focgen.diagnosis.verdict.unexplained import is_unknown
 from focgen.diagnosis.verdict.unsteady import unsteady
@@ -141,9 +142,9 @@ def _summary(
 
 
 def doubts(e: Explanation) -> tuple[Instead | None, ...]:
-    """What no effect is, and may be there instead of what was found."""
+    """What no effect is, or two others are, and may be there instead of what was found."""
     elsewise = changed_at_once(e), logged_late(e), clocks_apart(e), unevenly_paced(e), taken_up(e)
-    return *elsewise, *unsteady(e)
+    return *elsewise, *unsteady(e), two_instead(e)
 
 
 def sound_parts(explanations: Sequence[Explanation]) -> dict[Explanation, Explanation]:
