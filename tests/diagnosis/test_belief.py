@@ -11,15 +11,17 @@ import pytest
 from scipy.signal import lfilter
 
 from focgen.diagnosis.belief import further
-from focgen.diagnosis.belief.choice import likeliest
+from focgen.diagnosis.belief.choice import foremost_forms, likeliest
 from focgen.diagnosis.belief.further import Ground, Surroundings
 from focgen.diagnosis.belief.likelihood import Scale, log_likelihood, paid
 from focgen.diagnosis.belief.standing import behind, least_set, nominal_off, probabilities, tied_within
 from focgen.diagnosis.belief.unknown import is_none
 from focgen.diagnosis.fitting.fit import WHITE, Weighing, fit
-from focgen.diagnosis.hypotheses import explain, rivals
+from focgen.diagnosis.hypotheses import accept, explain, rivals
+from focgen.diagnosis.hypotheses.accept import AcceptanceCriteria
 from focgen.diagnosis.hypotheses.nuisances import uncertain
 from focgen.diagnosis.hypotheses.rivals import Rival, _needed
+from focgen.diagnosis.hypotheses.search import Ranking
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.segments import make
 from focgen.diagnosis.verdict import nominal, unexplained
@@ -106,6 +108,24 @@ def test_what_is_right_by_chance_is_there_and_not_chosen_for_it():
     ground = _ground(base, [exact, near])
     assert ground.odds(exact) - ground.odds(near) > 3.0
     assert 0.0 < ground.compared(exact) - ground.compared(near) < 1.0
+
+
+def test_of_a_family_the_likeliest_form_is_asked_and_not_the_one_that_leaves_least():
+    """A force that falls with the way was `contact`, 0.95: a curve of five values stood for its family."""
+    gap = _fit(13.2, predictable_share=0.89)
+    curve = _fit(1.18, ["gain_nonlinearity"], 0.27, 5)
+    falls = _fit(1.25, ["gain_nonlinearity"], 0.12, 2)
+    contact, creep = _fit(1.37, ["contact"], 0.26, 2), _fit(9.0, ["creep"], 0.8, 1)
+    ground = _ground(gap, [curve, falls, contact, creep])
+    assert foremost_forms(ground, [curve, contact, creep, falls]) == [falls, contact]
+    ranking = Ranking(gap, np.ones(1), {"gain_nonlinearity": curve, "contact": contact, "creep": creep},
+                      {"gain_nonlinearity": 9e3, "contact": 8e3, "creep": 1e3}, {}, (falls,))  # fmt: skip
+    assert ranking.on_all == (curve, contact, creep, falls)
+    asked = AcceptanceCriteria(12.0, None, None)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(accept, "counted", lambda of, base: 1e3)
+        patch.setattr(accept, "_goes_round", lambda base, winner: False)
+        assert accept.select([ranking], asked) is falls
 
 
 def test_nominal_parameters_a_little_off_are_asked_whether_they_have_to_be():

@@ -10,16 +10,23 @@ import numpy as np
 import pytest
 
 from focgen.diagnosis.belief.further import Surroundings
+from focgen.diagnosis.fitting.fit import Weighing
 from focgen.diagnosis.hypotheses import two
+from focgen.diagnosis.verdict.two_instead import two_instead
 from tests.diagnosis.test_belief import _COUNT, _fit
 
 ASKED = SimpleNamespace(surroundings=Surroundings())
 
 
-def ranking(base, *best):
-    """What ``base`` was ranked with; families by their last effect."""
+def ranking(base, *best, fallen=()):
+    """What ``base`` was ranked with; families by their last effect, and those that are ``fallen`` behind."""
     named = {f.problem.candidates[-1].effect: f for f in best}
-    return SimpleNamespace(base=base, best=named, winner=next(iter(named), None), ar=np.ones(1))
+    firsts = [*best, *fallen]
+
+    def but(without=lambda c: False):
+        return [f for f in firsts if not without(f.problem.candidates[-1])]
+
+    return SimpleNamespace(base=base, best=named, winner=next(iter(named), None), ar=np.ones(1), firsts=but)
 
 
 def left(square, *effects, told):
@@ -28,8 +35,9 @@ def left(square, *effects, told):
     return made
 
 
-def asked(monkeypatch, both, found):
-    """What comes of a gap of 100, of which a bend leaves most, and two others alone leave more."""
+def asked(monkeypatch, both, found, behind=False):
+    """What comes of a gap of 100, of which a bend leaves most, and two others alone leave more; so much that
+    they fell ``behind``, maybe."""
     gap = left(100.0, told=0.98)
     bend, creep, friction = (
         left(s, name, told=0.9) for s, name in ((50.0, "bend"), (60.0, "creep"), (70.0, "friction"))
@@ -49,13 +57,14 @@ def asked(monkeypatch, both, found):
     monkeypatch.setattr(two, "fit", lambda problem, vector, weighing, iterations: known[id(problem)])
     fits = (gap, bend, creep, friction, both, found or bend)
     known = {id(f.problem): f for f in fits}
-    first = ranking(gap, bend, creep, friction)
+    first = ranking(gap, bend, fallen=(creep, friction)) if behind else ranking(gap, bend, creep, friction)
     return two.two_at_once([first, ranking(found or bend)], (), ASKED)
 
 
-def test_two_are_found_where_each_alone_leaves_most(monkeypatch):
+@pytest.mark.parametrize("behind", [False, True])
+def test_two_are_found_where_each_alone_leaves_most(behind, monkeypatch):
     both = left(1.02, "creep", "friction", told=0.02)
-    (first, second), found = asked(monkeypatch, both, None)
+    (first, second), found = asked(monkeypatch, both, None, behind)
     assert found is both and second.winner == "friction" and first.winner == "bend"
 
 
@@ -69,3 +78,36 @@ def test_two_are_found_where_each_alone_leaves_most(monkeypatch):
 )
 def test_two_are_not_found_where_they_leave_much_or_one_does(both, found, monkeypatch):
     assert asked(monkeypatch, both, found) is None
+
+
+def others(monkeypatch, share, *pairs):
+    """What two effects each may be instead of a bend that leaves ``share`` of what it changes to inputs, by
+    what the ``pairs`` leave of a gap of 100."""
+    gap, bend = left(100.0, told=0.98), left(1.0 + 99.0 * share, "bend", told=0.0)
+    bend.predictable_share = 99.0 * share / (1.0 + 99.0 * share)
+    whole = [left(square, *names.split(), told=0.3) for square, names in pairs]
+    known = {id(f.problem): f for f in (gap, bend, *whole)}
+    monkeypatch.setattr(two, "_pairs", lambda name, first, candidates: whole)
+    monkeypatch.setattr(two, "fit", lambda problem, vector, weighing, iterations: known[id(problem)])
+    return two.two_others(bend, ranking(gap, bend), (), Weighing(np.ones(1)), ASKED)
+
+
+def test_two_others_may_be_there_instead_of_one_that_leaves_more_than_right_forms(monkeypatch):
+    """A supply's end and a drift were `softening`, 0.95: no pair was asked where one explains nine tenths."""
+    near, best, far = (1.9, "creep rail"), (1.2, "drift rail"), (30.0, "drift leak")
+    found = others(monkeypatch, 0.07, near, best, far, (1.5, "drift rail"))
+    assert [sorted(p.families) for p in found] == [["drift", "rail"], ["creep", "rail"], ["drift", "leak"]]
+    assert all(p.instead == "bend" for p in found)
+    assert found[0].odds > found[1].odds > -4.0 > found[2].odds
+    assert others(monkeypatch, 0.03, best) == ()
+
+
+def test_what_two_others_may_be_is_taken_from_a_confidence_and_said():
+    pairs = [two.TwoOthers("softening", frozenset({"drift", "rail"}), np.log(0.5))]
+    pairs.append(two.TwoOthers("softening", frozenset({"creep", "rail"}), np.log(0.25)))
+    e = SimpleNamespace(others=tuple(pairs), causes=("one",), whole=None)
+    doubt = two_instead(e)
+    assert doubt.sure == pytest.approx(0.75 / 1.75) and doubt.instead == {"softening"}
+    assert doubt.said == "instead of softening it may be (43%) two effects: drift and rail, or creep and rail"
+    assert two_instead(SimpleNamespace(others=(), causes=("one",))) is None
+    assert two_instead(SimpleNamespace(others=tuple(pairs), causes=("one", "another"))) is None

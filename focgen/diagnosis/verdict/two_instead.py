@@ -27,8 +27,8 @@ class Two(Instead):
 
 
 def two_instead(e: Explanation) -> Two | None:
-    """What two effects may be there instead of one; None where one explains its segment."""
-    if not e.others:
+    """What two effects may be there instead of the only one; None where that explains its segment."""
+    if not e.others or len(e.causes) != 1:
         return None
     odds = float(np.logaddexp.reduce([p.odds for p in e.others]))
     return Two(frozenset({e.others[0].instead}), odds, e.others)
