@@ -208,10 +208,14 @@ def _carried_on(
     less is left for it: what it left looked like another effect, or like a fault at a begin. A refit of what
     was found shows first whether that is worth a search."""
     for _ in range(_CARRIED):
+
+        def gains(logs: Sequence[Experiment], of: Sequence[Explanation] = explanations) -> float:
+            return sum(gained(e, logs) for e in of)
+
         carried = compose.carried_on(rigs, session)
-        if [log.begins for log in carried] == [log.begins for log in session]:
-            break
-        if sum(gained(e, carried) for e in explanations) < NUMBERS.nats:
+        if not _begin_elsewise(carried, session):
+            carried = compose.held_on(rigs, session, lambda logs: _as_square(gains(logs), logs))
+        if not _begin_elsewise(carried, session) or gains(carried) < NUMBERS.nats:
             break
         step("what carries on from one log to the next")
         again = search.better(explanations, carried)
@@ -219,6 +223,16 @@ def _carried_on(
             break
         explanations, rigs, session = again, compose.compose(search.nominal, again, carried), carried
     return explanations, rigs, session
+
+
+def _as_square(nats: float, logs: Sequence[Experiment]) -> float:
+    """The mean square, of what was left before, that a gain of ``nats`` over all samples leaves."""
+    return float(np.exp(-2.0 * nats / sum(map(len, logs))))
+
+
+def _begin_elsewise(logs: Sequence[Experiment], session: Sequence[Experiment]) -> bool:
+    """Whether any experiment begins in another way."""
+    return [log.begins for log in logs] != [log.begins for log in session]
 
 
 def _left_by(explanations: Sequence[Explanation]) -> float:

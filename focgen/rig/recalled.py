@@ -46,6 +46,7 @@ def with_recalled(
     logs: Sequence[Experiment],
     left: Callable[[Sequence[Experiment]], float],
     placed: Sequence[Placed] = (),
+    held: bool = False,
 ) -> tuple[Experiment, ...]:
     """The experiments as :func:`recalled` has them where that leaves less by ``left``, a mean square; else as
     they are. Where the pauses between them are not known, each is as long as suits them best. That a log goes
@@ -56,7 +57,7 @@ def with_recalled(
 
     def tried(pause: float) -> tuple[float, float, tuple[Experiment, ...]]:
         session = _spaced(logs, pause * response)
-        known = recalled(rig, session, placed)
+        known = recalled(rig, session, placed, held=held)
         asked = any(a is not b for a, b in zip(known, session))
         return (left(known) if asked else np.inf), pause, known
 
@@ -89,21 +90,26 @@ def _spaced(logs: Sequence[Experiment], pause: float) -> tuple[Experiment, ...]:
 
 
 def recalled(
-    rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] = (), closer: bool = True
+    rig: Rig,
+    logs: Sequence[Experiment],
+    placed: Sequence[Placed] = (),
+    closer: bool = True,
+    held: bool = False,
 ) -> tuple[Experiment, ...]:
     """The experiments, each that begins with an input of 0, or goes on from the last, with what the earlier
     ones put in; as they are where that would not show, or come no ``closer``, or in a rig that integrates
-    elsewhere than once, in its regulator."""
+    elsewhere than once, in its regulator. ``held``: one that begins elsewhere, too, its input since the last
+    one as its own begin tells: then ``closer`` is for the caller to ask."""
     once = rig.integrator == "regulator" and integrations(rig) == 1
     if len(logs) < 2 or not all(map(len, logs)) or ((integrations(rig) or rig.integrator) and not once):
         return tuple(logs)
     past = memory(rig, logs)
     found = tuple(
-        _recalled(log, [other for other in logs if ended(other) <= log.start], past) for log in logs
+        _recalled(log, [other for other in logs if ended(other) <= log.start], past, held) for log in logs
     )
     if rig.integrator:  # what was put in tells where a pump stood but for what errors add up to
         found = tuple(standing(rig, log, placed, ESTIMATED) for log in found)
-    return found if _shows(rig, placed, logs, found, closer) else tuple(logs)
+    return found if _shows(rig, placed, logs, found, closer and not held) else tuple(logs)
 
 
 def memory(rig: Rig, logs: Sequence[Experiment]) -> float:
@@ -117,14 +123,29 @@ def ended(log: Experiment) -> float:
     return log.start + (len(log) - 1) * log.sample_time
 
 
-def _recalled(log: Experiment, earlier: Sequence[Experiment], past: float) -> Experiment:
+def _recalled(log: Experiment, earlier: Sequence[Experiment], past: float, held: bool) -> Experiment:
     roles = [role for role in ENTERS if role in log and all(role in other for other in earlier)]
     begins = {role: begin_after(log, earlier, role, past) for role in roles if _is_known(log, earlier, role)}
+    if held and earlier:
+        begins = {role: begins.get(role) or _held(log, earlier, role, past) for role in roles}
     begins = {role: begin for role, begin in begins.items() if not begin.at_rest}
     if not begins:
         return log
     notes = (note for note in log.notes if note != ESTIMATED)
     return replace(log, begins=begins, notes=(*notes, NOTE))
+
+
+def _held(log: Experiment, earlier: Sequence[Experiment], role: str, past: float) -> Begin:
+    """An input's past, had it been since the last of the ``earlier`` logs what its own log tells, and before
+    the first of them what that one tells."""
+    begin, own = begin_after(log, earlier, role, past), log.before(role)
+    if not begin.ago:
+        return own
+    since = [t for t in own.ago if t < begin.ago[-1]]
+    levels = own.levels[-1 - len(since) :]
+    first = min(earlier, key=lambda other: other.start).before(role).levels[0]
+    whole = (first, *begin.levels[1:-1], *levels), (*begin.ago, *since)
+    return Begin(*whole, after=begin.after)
 
 
 def _is_known(log: Experiment, earlier: Sequence[Experiment], role: str) -> bool:
@@ -199,7 +220,7 @@ def _shows(
     """
     entry = next(role for role in ENTERS if role in logs[0])
     leaves = [s for s in STAGES[STAGES.index(ENTERS[entry]) :] if all(LEAVES[s] in log for log in logs)]
-    if not leaves or not any(log.before(entry).known for log in found):
+    if not leaves or all(a is b for a, b in zip(logs, found)):
         return False
     y = joined(logs, LEAVES[leaves[-1]])
     before, after = (_made(rig, placed, of, entry, leaves[-1]) for of in (logs, found))

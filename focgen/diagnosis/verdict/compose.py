@@ -3,7 +3,7 @@ simulated."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
@@ -91,12 +91,25 @@ def carried_on(rigs: Rigs, logs: Sequence[Experiment]) -> tuple[Experiment, ...]
     so that it need not come closer yet, unless the rests are not known. Not asked are what wanders, which
     makes up for what is left out of a begin, and what lies where its last turn was: the means over windows
     that a past is given as have no turns."""
-    lasting = tuple(p for p in rigs.placed if not (p.form.wanders or library()[p.effect].remembers))
+    lasting = _lasting(rigs)
     if not lasting:
         return tuple(logs)
     if any(log.paused for log in logs):
         return with_recalled(rigs.fitted, logs, lambda found: _gap(rigs.fitted, lasting, found), lasting)
     return recalled(rigs.fitted, logs, lasting, closer=False)
+
+
+def held_on(
+    rigs: Rigs, logs: Sequence[Experiment], left: Callable[[Sequence[Experiment]], float]
+) -> tuple[Experiment, ...]:
+    """The same where logs do not begin at 0: since the last one each input was what the log's own begin
+    tells, and that forgets what is slow. A refit tells, by the mean square that it has ``left``."""
+    lasting = _lasting(rigs)
+    return with_recalled(rigs.fitted, logs, left, lasting, held=True) if lasting else tuple(logs)
+
+
+def _lasting(rigs: Rigs) -> tuple[Placed, ...]:
+    return tuple(p for p in rigs.placed if not (p.form.wanders or library()[p.effect].remembers))
 
 
 def simulated(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment]) -> list[dict[str, np.ndarray]]:
