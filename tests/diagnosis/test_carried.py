@@ -17,14 +17,15 @@ REST = 15.0  # s, between the logs
 NOISE, PARTS = 0.004, 20
 
 
-def session(seed):
+def session(seed, at=0.0):
     """Three logs of holds of a pressure, of one lag with one Kelvin-Voigt element behind it, and with rests
-    between them that no log shows: start, pressure, output."""
-    rng, y, slow, start, found = np.random.default_rng(seed), 0.0, 0.0, 0.0, []
+    ``at`` a pressure between them that no log shows: start, pressure, output."""
+    rng, y, slow, start, found = np.random.default_rng(seed), 2.0 * at, 2.0 * at * SHARE, 0.0, []
     for _ in range(3):
-        p = np.r_[np.zeros(5), np.repeat(rng.uniform(0.3, 1.0, 4), 300), np.zeros(300 + int(REST / H))]
+        held = np.repeat(rng.uniform(0.3, 1.0, 4), 300)
+        p = np.r_[np.full(5, at), held, np.full(300 + int(REST / H), at)]
         made = []
-        for x, then in zip(p, np.r_[p[1:], 0.0]):  # the pressure runs in lines
+        for x, then in zip(p, np.r_[p[1:], at]):  # the pressure runs in lines
             made.append(y + slow)
             for j in range(PARTS):
                 y += H / PARTS * (2.0 * (x + (then - x) * (j + 0.5) / PARTS) - y) / LAG
@@ -37,13 +38,15 @@ def session(seed):
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("at", [0.0, 0.25])
 @pytest.mark.parametrize("clock", ["one", "of its own"])
-def test_a_creep_that_goes_on_is_no_drift(clock):
+def test_a_creep_that_goes_on_is_no_drift(clock, at):
+    """Where rigs rest elsewhere than at 0, a log was taken to begin at a level held for ever."""
     actuator = LinearActuator(TransferFunction([(2.05, 0.0)], [(0.52, 1.0), (1.0, 0.0)]))
     rig = Rig("finger", H, Signals("t", "y", pressure="p"), actuator)
     logs = [
         Experiment(f"run {k}", H, {"pressure": p, "output": y}, start=start)
-        for k, (start, p, y) in enumerate(session(2))
+        for k, (start, p, y) in enumerate(session(2, at))
     ]
     if clock != "one":
         logs = in_session_order([Experiment(log.name, H, log.signals) for log in logs])

@@ -105,9 +105,10 @@ def test_two_others_may_be_there_instead_of_one_that_leaves_more_than_right_form
 def test_what_two_others_may_be_is_taken_from_a_confidence_and_said():
     pairs = [two.TwoOthers("softening", frozenset({"drift", "rail"}), np.log(0.5))]
     pairs.append(two.TwoOthers("softening", frozenset({"creep", "rail"}), np.log(0.25)))
-    e = SimpleNamespace(others=tuple(pairs), causes=("one",), whole=None)
+    one, another = (SimpleNamespace(rivals=[SimpleNamespace(effect=n)]) for n in ("softening", "leak"))
+    e = SimpleNamespace(others=tuple(pairs), causes=(one,))
     doubt = two_instead(e)
     assert doubt.sure == pytest.approx(0.75 / 1.75) and doubt.instead == {"softening"}
     assert doubt.said == "instead of softening it may be (43%) two effects: drift and rail, or creep and rail"
-    assert two_instead(SimpleNamespace(others=(), causes=("one",))) is None
-    assert two_instead(SimpleNamespace(others=tuple(pairs), causes=("one", "another"))) is None
+    for others, causes in ((), (one,)), (tuple(pairs), (one, another)), (tuple(pairs), (another,)):
+        assert two_instead(SimpleNamespace(others=others, causes=causes)) is None

@@ -27,8 +27,9 @@ class Two(Instead):
 
 
 def two_instead(e: Explanation) -> Two | None:
-    """What two effects may be there instead of the only one; None where that explains its segment."""
-    if not e.others or len(e.causes) != 1:
+    """What two effects may be there instead of the only one found; None where that explains its segment, or
+    a rival has taken its place."""
+    if not e.others or [c.rivals[0].effect for c in e.causes] != [e.others[0].instead]:
         return None
     odds = float(np.logaddexp.reduce([p.odds for p in e.others]))
     return Two(frozenset({e.others[0].instead}), odds, e.others)
