@@ -116,10 +116,11 @@ def test_of_a_family_the_likeliest_form_is_asked_and_not_the_one_that_leaves_lea
     curve = _fit(1.18, ["gain_nonlinearity"], 0.27, 5)
     falls = _fit(1.25, ["gain_nonlinearity"], 0.12, 2)
     contact, creep = _fit(1.37, ["contact"], 0.26, 2), _fit(9.0, ["creep"], 0.8, 1)
+    rough = _fit(1.0, ["creep"], 0.0, 1)  # on means of samples, or in another colour
     ground = _ground(gap, [curve, falls, contact, creep])
     assert foremost_forms(ground, [curve, contact, creep, falls]) == [falls, contact]
-    ranking = Ranking(gap, np.ones(1), {"gain_nonlinearity": curve, "contact": contact, "creep": creep},
-                      {"gain_nonlinearity": 9e3, "contact": 8e3, "creep": 1e3}, {}, (falls,))  # fmt: skip
+    best = {"gain_nonlinearity": curve, "contact": contact, "creep": creep}
+    ranking = Ranking(gap, np.ones(1), best, dict.fromkeys(best, 1e3), {}, (rough, falls), (falls,))
     assert ranking.on_all == (curve, contact, creep, falls)
     asked = AcceptanceCriteria(12.0, None, None)
     with pytest.MonkeyPatch.context() as patch:

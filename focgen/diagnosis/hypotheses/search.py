@@ -52,6 +52,7 @@ class Ranking:
     gain: dict[str, float]
     errors: dict[str, float]
     left: tuple[Fit, ...] = ()
+    further: tuple[Fit, ...] = ()
 
     @property
     def winner(self) -> str | None:
@@ -70,9 +71,9 @@ class Ranking:
 
     @property
     def on_all(self) -> tuple[Fit, ...]:
-        """The families' best, and what further forms were fitted to every sample."""
-        whole = len(self.base.innovations)
-        return *self.best.values(), *(f for f in self.left if len(f.innovations) == whole)
+        """What was fitted to every sample, to the end and in one colour: the families' best, and further
+        forms."""
+        return *self.best.values(), *self.further
 
 
 def evidence(of: Fit, against: Fit) -> float:
@@ -220,7 +221,7 @@ def _ranking(ground: Fit, ar: np.ndarray, tried: Sequence[Fit], errors: dict[str
         families.setdefault(family(one), one)
     gain = {name: evidence(f, ground) for name, f in families.items()}
     left = tuple(t for t in tried if families[family(t)] is not t)
-    return Ranking(ground, ar, families, gain, errors, left)
+    return Ranking(ground, ar, families, gain, errors, left, left)
 
 
 def family(of: Fit) -> str:
