@@ -127,11 +127,11 @@ def test_coupled_drives_fold_the_speed_or_are_unknown(tmp_path):
 
 def test_pump_vents_slowly(tmp_path):
     """Filling takes 2.3 to 2.8 s to 63 %, venting 5.5 to 6.1 s to 37 %, in the log itself. The regulator's
-    gain is moved far from the file's, which takes a tenth of the confidence."""
+    gain is moved far from the file's, which takes a tenth of the confidence, and two others a twentieth."""
     found = diagnosed("pump", tmp_path, to=58.0)
     (cause,) = found.causes
     first = cause.candidates[0]
-    assert (cause.stage, first.effect) == ("regulator", "valve_asymmetry") and first.confidence > 0.85
+    assert (cause.stage, first.effect) == ("regulator", "valve_asymmetry") and first.confidence > 0.8
     assert any("moves the regulator's gain by +15" in note for note in found.notes)
     ratio = filling_by_venting(**{name: p.value for name, p in first.parameters.items()}, level=62.0)
     assert 2.3 / 6.1 < ratio < 2.8 / 5.5

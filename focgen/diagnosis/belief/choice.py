@@ -61,4 +61,6 @@ def likeliest(ground: Ground, tried: Sequence[Fit]) -> tuple[Fit, float]:
     odds = [ground.odds(f) + prior(c, beside) for f, c in zip(tried, last)]
     asked = [o - ground.closer(f) for f, o in zip(tried, odds)]
     best = max(range(len(tried)), key=lambda i: (asked[i] > 0.0, odds[i]))
+    alike = [i for i, c in enumerate(last) if c.effect == last[best].effect and odds[i] > odds[best] - 1.0]
+    best = min(alike, key=lambda i: (asked[i] <= 0.0, tried[i].sse))
     return tried[best], asked[best]

@@ -66,28 +66,32 @@ def two_others(
     asked: AcceptanceCriteria,
 ) -> tuple[TwoOthers, ...]:
     """Two families each instead of the one that was ``found``, the likeliest first, where that leaves more
-    than forms lack of a rig. None where it explains its segment."""
+    than forms lack of a rig, and they do not; none where it explains its segment. What is found may have
+    another effect beside it as well, which is too unlikely by itself to be named."""
     if len(found.problem.families) != 1 or _explains(found, first, NUMBERS.form**2):
         return ()
     (name,), known = found.problem.families, dict[frozenset[str], float]()
-    for both in _pairs(name, first, candidates):
+    for both in _pairs(found, first, candidates):
         whole = fit(both.problem, both.vector, weighing, _FITTED)
-        alone, two = _odds(whole, first, found, weighing, asked)
         families = frozenset(whole.problem.families)
-        known[families] = max(two - alone, known.get(families, -np.inf))
-    return tuple(TwoOthers(name, f, known[f]) for f in sorted(known, key=lambda f: -known[f]))
+        if name in families or _explains(whole, first, NUMBERS.form**2):
+            alone, two = _odds(whole, first, found, weighing, asked)
+            known[families] = max(two - alone, known.get(families, -np.inf))
+    there = float(np.logaddexp.reduce([0.0, *(odds for f, odds in known.items() if name in f)]))
+    others = [TwoOthers(name, f, odds - there) for f, odds in known.items() if name not in f]
+    return tuple(sorted(others, key=lambda o: -o.odds))
 
 
-def _pairs(found: str, first: Ranking, candidates: Sequence[CandidateEffect]) -> Iterator[Fit]:
-    """The likeliest pairs without the family ``found``, of the likeliest others, as fits to all samples that
+def _pairs(found: Fit, first: Ranking, candidates: Sequence[CandidateEffect]) -> Iterator[Fit]:
+    """The likeliest pairs with the one ``found``, and of the likeliest others, as fits to all samples that
     have yet to be made: they are looked for on means of few. What changes the plant's own equation is left
     out, for beside that every run takes several times as long."""
-    others = [c for c in candidates if c.effect != found and not _in_the_plant(c)]
-    firsts = [f for f in first.firsts(without=_in_the_plant) if family(f) != found]
-    for one in firsts[:_TRIED]:
+    name, seconds = family(found), [c for c in candidates if not _in_the_plant(c)]
+    firsts = [f for f in first.firsts(without=_in_the_plant) if family(f) != name]
+    for one in [found, *firsts[:_TRIED]]:
         factor = max(1, min(len(one.problem.segment.y) // _SEEN, one.problem.coarsest))
         thin = one.problem.thinned(factor)
-        beside = [c for c in thin.untried(others) if c.effect != family(one)]
+        beside = [c for c in thin.untried(seconds) if c.effect not in (name, family(one))]
         second = rank(thin, thin.stretched(one.vector, 1.0 / factor), beside)
         for both in list(second.best.values())[:_SECONDS]:
             yield on_all(both, one.problem, factor)
