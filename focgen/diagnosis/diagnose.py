@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -208,14 +209,10 @@ def _carried_on(
     less is left for it: what it left looked like another effect, or like a fault at a begin. A refit of what
     was found shows first whether that is worth a search."""
     for _ in range(_CARRIED):
-
-        def gains(logs: Sequence[Experiment], of: Sequence[Explanation] = explanations) -> float:
-            return sum(gained(e, logs) for e in of)
-
         carried = compose.carried_on(rigs, session)
         if not _begin_elsewise(carried, session):
-            carried = compose.held_on(rigs, session, lambda logs: _as_square(gains(logs), logs))
-        if not _begin_elsewise(carried, session) or gains(carried) < NUMBERS.nats:
+            carried = compose.held_on(rigs, session, partial(_square_left, explanations))
+        if not _begin_elsewise(carried, session) or _nats_gained(explanations, carried) < NUMBERS.nats:
             break
         step("what carries on from one log to the next")
         again = search.better(explanations, carried)
@@ -225,9 +222,14 @@ def _carried_on(
     return explanations, rigs, session
 
 
-def _as_square(nats: float, logs: Sequence[Experiment]) -> float:
-    """The mean square, of what was left before, that a gain of ``nats`` over all samples leaves."""
-    return float(np.exp(-2.0 * nats / sum(map(len, logs))))
+def _nats_gained(explanations: Sequence[Explanation], logs: Sequence[Experiment]) -> float:
+    """What explanations gain by a refit where their experiments begin as in ``logs``."""
+    return sum(gained(e, logs) for e in explanations)
+
+
+def _square_left(explanations: Sequence[Explanation], logs: Sequence[Experiment]) -> float:
+    """The mean square that such a refit leaves, of what was left before, as if of all samples alike."""
+    return float(np.exp(-2.0 * _nats_gained(explanations, logs) / sum(map(len, logs))))
 
 
 def _begin_elsewise(logs: Sequence[Experiment], session: Sequence[Experiment]) -> bool:

@@ -50,7 +50,7 @@ def with_recalled(
 ) -> tuple[Experiment, ...]:
     """The experiments as :func:`recalled` has them where that leaves less by ``left``, a mean square; else as
     they are. Where the pauses between them are not known, each is as long as suits them best. That a log goes
-    on from another is known, and has only to leave no more."""
+    on from another is known, and has only to leave no more. ``held``: as of :func:`recalled`."""
     logs = _with_cut(rig, logs, left, placed)
     paused = any(log.paused for log in logs)
     response = response_time(rig, logs[0].sample_time, longest(logs)) if paused else 0.0

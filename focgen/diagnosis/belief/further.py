@@ -111,10 +111,10 @@ class Ground:
         not choose it."""
         return self.odds(of, most, speaks)
 
-    def roughly(self, of: Fit, rule: Rule = speaks_or_is_right) -> float:
+    def roughly(self, of: Fit) -> float:
         """What speaks for a fit as it is, its nominal parameters kept no closer: enough to tell forms of one
         family apart."""
-        return self._speaks(of, None, rule)
+        return self._speaks(of, None, speaks_or_is_right)
 
     def closer(self, of: Fit) -> float:
         """The nats of its odds that a fit has for nominal parameters closer to those given."""
