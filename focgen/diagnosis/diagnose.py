@@ -101,7 +101,7 @@ def diagnose(
     explanations, session = _lasting(search, explanations, session)
     rigs = compose.compose(nominal, explanations, session)
     explanations, rigs, session = _carried_on(search, explanations, rigs, session)
-    session = begun_with(rigs.fitted, rigs.placed, session)
+    session = begun_with(rigs.fitted, rigs.placed, session, closely=True)
     rigs, diagnosis, evidence = conclude(nominal, session, rigs, explanations, ran, only is not None)
     proposed = propose(nominal, session, explanations, diagnosis.causes)
     diagnosis = replace(

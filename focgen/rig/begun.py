@@ -80,10 +80,17 @@ def _gaps(run: Run) -> list[float | None]:
     for (a, _), begin, (ahead, _), earlier in zip(spans[1:], run.begins[1:], spans, run.begins):
         gap, since = float(clock[a] - clock[a - 1]), float(clock[a] - clock[ahead])
         followed = begin.after is not None and abs(gap - begin.after) < _ALIKE * run.h
+        followed = followed and _is_still(begin, gap - run.h)
         # all that was before is in the one ahead, or has been put ahead of that
         whole = earlier.known or max(begin.ago, default=0.0) <= _WIDER * since + _ALIKE * run.h
         found.append(gap if followed and whole else None)
     return found
+
+
+def _is_still(begin: Begin, since: float) -> bool:
+    """Whether a signal was since so many s ago what it was last."""
+    later = (level for level, t in zip(begin.levels[1:], begin.ago) if t < since)
+    return all(level == begin.levels[-1] for level in later)
 
 
 def _rests(begin: Begin, gap: float | None) -> int:

@@ -42,6 +42,16 @@ def stretched(begin: Begin, times: float) -> Begin:
     return replace(begin, levels=tuple(last + times * (level - last) for level in begin.levels))
 
 
+def raised(begin: Begin, by: float, early: float, late: float) -> Begin:
+    """The begin with its signal higher ``by`` so much from ``early`` to ``late`` s before the log."""
+    ends = sorted({*begin.ago, early, late} - {0.0, np.inf}, reverse=True)
+    levels = []
+    for upper, lower in zip([np.inf, *ends], [*ends, 0.0]):
+        level = begin.levels[sum(t >= upper for t in begin.ago)]
+        levels.append(level + by if late <= lower and upper <= early else level)
+    return replace(begin, levels=tuple(levels), ago=tuple(ends))
+
+
 def _in_windows(past: Array, h: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """A past (n,), a sample every ``h`` s up to one ahead of the log: its means over windows, the latest
     last, and how long ago, s, each began."""

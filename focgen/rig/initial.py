@@ -22,17 +22,16 @@ from focgen.arrays import Array
 from focgen.logs.begin import REST, Begin
 from focgen.logs.between import white_level
 from focgen.logs.experiment import Experiment
-from focgen.rig.carried import FIRST, carried, stretched
+from focgen.rig.carried import FIRST, carried, raised, stretched
 from focgen.rig.effects import Run
 from focgen.rig.engine import Chain, Placed, between_of
-from focgen.rig.response import response_time
+from focgen.rig.magnitudes import Magnitudes
 from focgen.rig.rig import UNITY, LinearActuator, Rig
-from focgen.rig.stages import ENTERS, LEAVES, STAGES
+from focgen.rig.stages import ENTERS, STAGES
 from focgen.rig.stood import standing
-from focgen.rig.tried import Try, likeliest
+from focgen.rig.tried import Try, likeliest, nearest
 
 NOTE = "begins away from rest: the state that it starts from is estimated"
-_ROLES = ("command", "pressure", "curvature", "output")
 _SEEN = 40.0  # response times from the beginning that are looked at,
 _LEAST = 200  # and samples
 _LONGEST = 20.0  # response times before the first sample: a step is looked for up to here
@@ -46,6 +45,7 @@ _OFFSET = 4.0  # times better than any past: then a rest with an offset of any s
 _NOTHING = 0.06  # of the input's largest magnitude: what counts as 0
 _LITTLE = 0.01  # of it: less, held before a log, does not show
 _BEYOND = 0.2  # of it: by so much earlier levels may leave the input's range
+_WINDOW = 0.5  # of it: by what it may have been another in a window before, a standard deviation
 _TIMES_AS_FAR = (0.5, 2.0)  # a past that another signal's made may be from where the log begins
 _NOWHERE = 1e3  # of a signal's largest magnitude: where a spring that gives way has nothing to hold it
 _SHOWN = 0.3  # of a response time at 0: what is shorter shows no decay
@@ -77,12 +77,15 @@ _PASSING = replace(_IDLE, cost=0.05)
 No decay at rest shows the past then, so the past has to explain nearly all of what a rest leaves."""
 
 
-def begun(rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] = ()) -> tuple[Experiment, ...]:
+def begun(
+    rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] = (), closely: bool = False
+) -> tuple[Experiment, ...]:
     """The experiments, each with what every signal that enters a stage was before, where the data ask for
     it.
 
-    ``placed``: effects in the rig. What integrates has no equilibrium to begin from: of a rig that does is
-    told where it stood, and, behind a regulator that does, what the stages there came from.
+    ``placed``: effects in the rig. ``closely``: the rig has the numbers that suit the logs, so that what few
+    steps before them leave is the past's. What integrates has no equilibrium to begin from: of a rig that
+    does is told where it stood, and, behind a regulator that does, what the stages there came from.
     """
     if not all(map(len, logs)):
         return tuple(logs)
@@ -91,7 +94,7 @@ def begun(rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] = ()) -
         if rig.integrator == "regulator" and all(map(np.isfinite, _gains(behind))):
             logs = _driven(rig, behind, logs, placed)
         return tuple(standing(rig, log, placed, NOTE) for log in logs)
-    return _told(rig, logs, placed, tuple(ENTERS))
+    return _told(rig, logs, placed, tuple(ENTERS), closely)
 
 
 def _driven(
@@ -106,60 +109,38 @@ def _driven(
 
 
 def _told(
-    rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed], entries: Sequence[str]
+    rig: Rig,
+    logs: Sequence[Experiment],
+    placed: Sequence[Placed],
+    entries: Sequence[str],
+    closely: bool = False,
 ) -> tuple[Experiment, ...]:
     """The experiments with what the signals were before that enter a stage, those of the ``entries`` that are
     logged."""
-    scales = _Scales.of(rig, logs)
+    scales = Magnitudes.of(rig, logs)
     logged = [role for role in entries if role in scales.sizes and scales.behind(role)]
-    return tuple(_begun(rig, log, placed, logged, scales) for log in logs)
-
-
-@dataclass(frozen=True)
-class _Scales:
-    """Of a session: by role a signal's ``ranges`` with 0 in it and ``sizes``, its largest magnitude;
-    ``pace``: the rig's response time, s."""
-
-    ranges: Mapping[str, tuple[float, float]]
-    sizes: Mapping[str, float]
-    pace: float
-
-    @classmethod
-    def of(cls, rig: Rig, logs: Sequence[Experiment]) -> _Scales:
-        ranges = {role: _range(logs, role) for role in _ROLES if all(role in log for log in logs)}
-        sizes = {role: max(-low, high) or 1.0 for role, (low, high) in ranges.items()}
-        longest = max(len(log) * log.sample_time for log in logs)
-        return cls(ranges, sizes, response_time(rig, logs[0].sample_time, longest))
-
-    def behind(self, entry: str) -> dict[str, str]:
-        """The measured signals that tell what an input was before, by the stage that they leave.
-
-        The first input of a log runs through all stages, and all that is measured tells of it. One in between
-        is simulated up to the next measured signal: what a gauge further on shows may be that one's fault.
-        """
-        stages = STAGES[STAGES.index(ENTERS[entry]) :]
-        found = {stage: LEAVES[stage] for stage in stages if LEAVES[stage] in self.sizes}
-        first = next(role for role in ENTERS if role in self.sizes)
-        return found if entry == first else dict(list(found.items())[:1])
-
-
-def _range(logs: Sequence[Experiment], role: str) -> tuple[float, float]:
-    ends = [(float(np.min(log[role])), float(np.max(log[role]))) for log in logs]
-    return min(0.0, *(low for low, _ in ends)), max(0.0, *(high for _, high in ends))
+    return tuple(_begun(rig, log, placed, logged, scales, closely) for log in logs)
 
 
 def _begun(
-    rig: Rig, log: Experiment, placed: Sequence[Placed], entries: Iterable[str], scales: _Scales
+    rig: Rig,
+    log: Experiment,
+    placed: Sequence[Placed],
+    entries: Iterable[str],
+    scales: Magnitudes,
+    closely: bool,
 ) -> Experiment:
-    if any(begin.known for begin in log.begins.values()):
+    told = any(begin.after is not None for begin in log.begins.values())  # by earlier logs
+    if any(begin.known for begin in log.begins.values()) or (told and not closely):
         return log
     if len(log) < 2 * FIRST or not all(np.all(np.isfinite(log[role])) for role in scales.sizes):
         return log
     found: dict[str, Begin] = {}
     for entry in entries:
         setting = _Setting(rig, log, entry, placed, scales)
-        told = [setting.told_by(ahead, begin) for ahead, begin in found.items() if begin.ago]
-        found[entry] = setting.chosen([t for tries in told for t in tries])
+        found[entry] = log.before(entry) if told else setting.told(found)
+        if closely and not found[entry].at_rest:
+            found[entry] = setting.in_windows(found[entry])
     found = {entry: begin for entry, begin in found.items() if not begin.at_rest}
     notes = tuple(note for note in log.notes if note != NOTE)
     return replace(log, begins=found, notes=(*notes, NOTE) if found else notes)
@@ -175,7 +156,7 @@ class _Setting:
     """One experiment, the rig, and what is measured behind the ``entry``."""
 
     def __init__(
-        self, rig: Rig, log: Experiment, entry: str, placed: Sequence[Placed], scales: _Scales
+        self, rig: Rig, log: Experiment, entry: str, placed: Sequence[Placed], scales: Magnitudes
     ) -> None:
         self.chain, self.entry, self.h = Chain(rig, tuple(placed)), entry, log.sample_time
         pace, self.reach = scales.pace, scales.sizes[entry]
@@ -235,7 +216,31 @@ class _Setting:
         made: Array = (raw - np.clip(mean, -offset, offset)) * self.counts
         return made
 
-    def told_by(self, ahead: str, begin: Begin) -> Iterator[Try]:
+    def told(self, found: Mapping[str, Begin]) -> Begin:
+        """The begin, where those of the entries ahead are ``found``."""
+        told = [self._told_by(ahead, begin) for ahead, begin in found.items() if begin.ago]
+        return self._chosen([t for tries in told for t in tries])
+
+    def in_windows(self, begin: Begin) -> Begin:
+        """The begin with what the input was before in windows, the longer the longer they are ago, each as
+        near to what it is there as the data let it be: few steps do not tell what a fractional actuator
+        remembers of many."""
+        ends = self.h * 2.0 ** np.arange(max(np.ceil(np.log2(self.longest / self.h)), 1.0) + 1.0)
+        spans = list(zip([*ends, np.inf], [0.0, *ends]))
+        step, off = _WINDOW * self.reach, self._missed(begin)
+        rows = [self._missed(raised(begin, step, *span)) - off for span in spans]
+        by, free = nearest(np.stack([(row * self.counts).ravel() for row in rows]), off * self.counts)
+        found = begin
+        for span, size in zip(spans, by):
+            found = raised(found, step * float(size), *span)
+        return likeliest([self._at_once(begin, 0), self._at_once(found, free)], 0.0).begin
+
+    def _at_once(self, begin: Begin, free: int) -> Try:
+        """The same as :meth:`at`, but an offset is no less left than all else."""
+        raw = self._missed(begin)
+        return Try(begin, free, raw, raw * self.counts)
+
+    def _told_by(self, ahead: str, begin: Begin) -> Iterator[Try]:
         """The past that the signal ``ahead`` makes of the input, where that one's is ``begin``: as it is, and
         so many times as far from where the log begins as suits best."""
         leaves = STAGES[STAGES.index(ENTERS[self.entry]) - 1]
@@ -245,7 +250,7 @@ class _Setting:
         yield base
         yield self.at(stretched(base.begin, float(np.clip(times, *_TIMES_AS_FAR))), 1)
 
-    def chosen(self, further: Sequence[Try] = ()) -> Begin:
+    def _chosen(self, further: Sequence[Try]) -> Begin:
         """The begin that the data ask for, of all kinds and the ``further`` ones."""
         rest, asked = self.at(REST, 0), self.asked
         noise = np.array([_white(y) for y in self.y.T])
@@ -257,7 +262,7 @@ class _Setting:
             return float(np.linalg.norm(t.first[moved]) / np.linalg.norm(rest.first[moved]))
 
         most = asked.cost * rest.cost
-        tries = [t for t in (*further, *self.tries()) if off(t) < asked.mended and t.cost < most]
+        tries = [t for t in (*further, *self._tries()) if off(t) < asked.mended and t.cost < most]
         if not tries:
             return REST
         sure = np.max(rest.first) > asked.far and min(map(off, tries)) < asked.surely
@@ -283,7 +288,7 @@ class _Setting:
 
     # -- candidates, from the simplest on -------------------------------------------------------------------
 
-    def tries(self) -> list[Try]:
+    def _tries(self) -> list[Try]:
         """The best of each kind of begin but a rest."""
         held = self.at(Begin((self.level,)), 0)
         times = np.log(np.geomspace(_SOONEST * self.h, self.longest, _TIMES))

@@ -13,8 +13,8 @@ it: one recording was cut in two. Its past is known, whatever its input is then.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -55,16 +55,30 @@ def with_recalled(
     paused = any(log.paused for log in logs)
     response = response_time(rig, logs[0].sample_time, longest(logs)) if paused else 0.0
 
-    def tried(pause: float) -> tuple[float, float, tuple[Experiment, ...]]:
+    def tried(pause: float, own: frozenset[int] = frozenset()) -> _Tried:
         session = _spaced(logs, pause * response)
-        known = recalled(rig, session, placed, held=held)
+        known = recalled(rig, session, placed, held=own if held else None)
         asked = any(a is not b for a, b in zip(known, session))
-        return (left(known) if asked else np.inf), pause, known
+        return _Tried(left(known) if asked else np.inf, pause, own, known)
 
-    best = min(map(tried, _PAUSES if paused else (0.0,)), key=lambda t: t[0])
-    for step in _CLOSER if best[1] and np.isfinite(best[0]) else ():
-        best = min([best, tried(best[1] * step), tried(best[1] / step)], key=lambda t: t[0])
-    return best[2] if np.isfinite(best[0]) and best[0] < _RECALLED * left(logs) else tuple(logs)
+    best = min(map(tried, _PAUSES if paused else (0.0,)), key=lambda t: t.left)
+    for step in _CLOSER if best.pause and np.isfinite(best.left) else ():
+        best = min([best, tried(best.pause * step), tried(best.pause / step)], key=lambda t: t.left)
+    moved = _moved_since(_spaced(logs, best.pause * response)) if held and np.isfinite(best.left) else []
+    for number in moved:
+        best = min([best, tried(best.pause, best.own | {number})], key=lambda t: t.left)
+    return best.logs if np.isfinite(best.left) and best.left < _RECALLED * left(logs) else tuple(logs)
+
+
+@dataclass(frozen=True)
+class _Tried:
+    """A session with pauses of so many response times, its ``logs`` with what that puts ahead of them, what
+    these have ``left``, and those whose input moved since the last one as their ``own`` begins tell."""
+
+    left: float
+    pause: float
+    own: frozenset[int]
+    logs: tuple[Experiment, ...]
 
 
 def _with_cut(
@@ -94,22 +108,24 @@ def recalled(
     logs: Sequence[Experiment],
     placed: Sequence[Placed] = (),
     closer: bool = True,
-    held: bool = False,
+    held: Collection[int] | None = None,
 ) -> tuple[Experiment, ...]:
     """The experiments, each that begins with an input of 0, or goes on from the last, with what the earlier
     ones put in; as they are where that would not show, or come no ``closer``, or in a rig that integrates
-    elsewhere than once, in its regulator. ``held``: one that begins elsewhere, too, its input since the last
-    one as its own begin tells: then ``closer`` is for the caller to ask."""
+    elsewhere than once, in its regulator. ``held``: those that begin elsewhere, too. Then the input was
+    between two what it is as the later one begins, but since the last one, for these numbers, what their own
+    begins tell; and ``closer`` is for the caller to ask."""
     once = rig.integrator == "regulator" and integrations(rig) == 1
     if len(logs) < 2 or not all(map(len, logs)) or ((integrations(rig) or rig.integrator) and not once):
         return tuple(logs)
     past = memory(rig, logs)
     found = tuple(
-        _recalled(log, [other for other in logs if ended(other) <= log.start], past, held) for log in logs
+        _recalled(log, _earlier(log, logs), past, None if held is None else n in held)
+        for n, log in enumerate(logs)
     )
     if rig.integrator:  # what was put in tells where a pump stood but for what errors add up to
         found = tuple(standing(rig, log, placed, ESTIMATED) for log in found)
-    return found if _shows(rig, placed, logs, found, closer and not held) else tuple(logs)
+    return found if _shows(rig, placed, logs, found, closer and held is None) else tuple(logs)
 
 
 def memory(rig: Rig, logs: Sequence[Experiment]) -> float:
@@ -123,11 +139,26 @@ def ended(log: Experiment) -> float:
     return log.start + (len(log) - 1) * log.sample_time
 
 
-def _recalled(log: Experiment, earlier: Sequence[Experiment], past: float, held: bool) -> Experiment:
+def _earlier(log: Experiment, logs: Sequence[Experiment]) -> list[Experiment]:
+    """Those that had ended as a log began, the first of them first."""
+    ended_then = (other for other in logs if ended(other) <= log.start)
+    return sorted(ended_then, key=lambda other: other.start)
+
+
+def _moved_since(logs: Sequence[Experiment]) -> list[int]:
+    """The numbers of the experiments whose own begins tell of a step since the last one."""
+    gaps = [log.start - max(map(ended, _earlier(log, logs)), default=log.start) for log in logs]
+    steps = [[t for begin in log.begins.values() if not begin.known for t in begin.ago] for log in logs]
+    return [n for n, (gap, ago) in enumerate(zip(gaps, steps)) if any(t < gap for t in ago)]
+
+
+def _recalled(log: Experiment, earlier: Sequence[Experiment], past: float, own: bool | None) -> Experiment:
+    """A log with its inputs' pasts; ``own``: whether one that is not known was since the last of the
+    ``earlier`` logs what its own begin tells, or where it begins; None where it is left as it is."""
     roles = [role for role in ENTERS if role in log and all(role in other for other in earlier)]
     begins = {role: begin_after(log, earlier, role, past) for role in roles if _is_known(log, earlier, role)}
-    if held and earlier:
-        begins = {role: begins.get(role) or _held(log, earlier, role, past) for role in roles}
+    if own is not None and earlier:
+        begins = {role: begins.get(role) or _held(log, earlier, role, past, own) for role in roles}
     begins = {role: begin for role, begin in begins.items() if not begin.at_rest}
     if not begins:
         return log
@@ -135,17 +166,26 @@ def _recalled(log: Experiment, earlier: Sequence[Experiment], past: float, held:
     return replace(log, begins=begins, notes=(*notes, NOTE))
 
 
-def _held(log: Experiment, earlier: Sequence[Experiment], role: str, past: float) -> Begin:
-    """An input's past, had it been since the last of the ``earlier`` logs what its own log tells, and before
-    the first of them what that one tells."""
-    begin, own = begin_after(log, earlier, role, past), log.before(role)
+def _held(log: Experiment, earlier: Sequence[Experiment], role: str, past: float, own: bool) -> Begin:
+    """An input's past, had it been between any two logs where the later one begins, but since the last of the
+    ``earlier`` ones, where ``own``, what its log's begin tells; and before the first what that one tells."""
+    begins = [other.before(role) for other in (*earlier, log)]
+    behind = (*earlier[1:],) if own else (*earlier[1:], log)
+    rests = [_rest(log, a, b, role) for a, b in zip(earlier, behind)]
+    begin = begin_after(log, earlier, role, past, rests)
     if not begin.ago:
-        return own
-    since = [t for t in own.ago if t < begin.ago[-1]]
-    levels = own.levels[-1 - len(since) :]
-    first = min(earlier, key=lambda other: other.start).before(role).levels[0]
-    whole = (first, *begin.levels[1:-1], *levels), (*begin.ago, *since)
-    return Begin(*whole, after=begin.after)
+        return begins[-1]
+    since = [t for t in begins[-1].ago if t < begin.ago[-1]] if own else []
+    levels = begins[0].levels[0], *begin.levels[1:-1], *begins[-1].levels[-1 - len(since) :]
+    return Begin(levels, (*begin.ago, *since), after=begin.after)
+
+
+def _rest(log: Experiment, before: Experiment, behind: Experiment, role: str) -> tuple[Array, Array]:
+    """How long before a ``log``, s, the samples would have been between two others, and what they are where
+    the input was then what it is as the later one begins."""
+    h = log.sample_time
+    ago = np.arange(log.start - ended(before) - h, log.start - behind.start + 0.5 * h, -h)
+    return ago, np.full(len(ago), behind.before(role).levels[-1])
 
 
 def _is_known(log: Experiment, earlier: Sequence[Experiment], role: str) -> bool:
@@ -181,10 +221,19 @@ def _largest(log: Experiment, earlier: Sequence[Experiment], role: str) -> float
     return max(float(np.max(np.abs(each[role]))) for each in (log, *earlier))
 
 
-def begin_after(log: Experiment, earlier: Sequence[Experiment], role: str, past: float) -> Begin:
-    """An input's past, by the logs of the ``earlier`` experiments, up to so many s before this one."""
-    ago = np.concatenate([np.zeros(0), *(_ago(log, other) for other in earlier)])
-    x = np.concatenate([np.zeros(0), *(np.asarray(other[role], float) for other in earlier)])
+def begin_after(
+    log: Experiment,
+    earlier: Sequence[Experiment],
+    role: str,
+    past: float,
+    rests: Sequence[tuple[Array, Array]] = (),
+) -> Begin:
+    """An input's past, by the logs of the ``earlier`` experiments, up to so many s before this one, and by
+    ``rests``, how long ago it was what between them; 0 where neither tells."""
+    shown = [(_ago(log, other), np.asarray(other[role], float)) for other in earlier]
+    ago, x = (
+        (np.concatenate([np.zeros(0), *of]) for of in zip(*shown, *rests)) if shown else (np.zeros(0),) * 2
+    )
     seen = ago <= past
     if not seen.any():
         return Begin()

@@ -11,6 +11,8 @@ from focgen.arrays import Array
 from focgen.logs.begin import Begin
 from focgen.rig.carried import FIRST
 
+_ROUNDS = 3  # of telling noise from what is not yet made up for
+
 
 @dataclass(frozen=True, eq=False)
 class Try:
@@ -43,6 +45,19 @@ def likeliest(tries: Sequence[Try], nats: float) -> Try:
         return float(count * np.log(max(t.cost, 1e-300)) + asked)
 
     return min(tries, key=criterion)
+
+
+def nearest(rows: Array, left: Array) -> tuple[Array, int]:
+    """How much of each of the ``rows`` (k, n) makes what is ``left`` (n in all) likeliest, where a standard
+    deviation of each is 1, and how many free numbers that is worth."""
+    sides, sizes, ways = np.linalg.svd(rows, full_matrices=False)
+    share, rest = -ways @ left.ravel(), float(np.sum(left**2))
+    count = _effective(left)
+    for _ in range(_ROUNDS):
+        kept = sizes**2 / (sizes**2 + max(rest, 1e-300) / count)
+        rest = float(np.sum(left**2) - np.sum((1.0 - (1.0 - kept) ** 2) * share**2))
+    made: Array = sides @ (kept * share / np.maximum(sizes, 1e-300))
+    return made, round(float(np.sum(kept)))
 
 
 def _effective(left: Array) -> float:

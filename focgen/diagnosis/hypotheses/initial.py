@@ -19,7 +19,7 @@ from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.problem.segments import Segment, cuts, make
 from focgen.logs.begin import REST, Begin
 from focgen.logs.experiment import Experiment
-from focgen.rig.carried import stretched
+from focgen.rig.carried import raised
 from focgen.rig.effects import Run
 from focgen.rig.engine import Chain, Placed
 from focgen.rig.initial import begun
@@ -28,8 +28,13 @@ from focgen.rig.rig import Rig
 
 _AGAIN = 2  # times that the rig is refitted and the begins told anew
 _ROUNDS = 6  # of a refit
-_LEVEL = 0.1  # of the input's largest magnitude: by what a level before may be off, a standard deviation
-_TIME = 1.3  # times: by what the time of a step before may be
+_LEVEL = (
+    0.3  # of the input's level: by what it may have been another in a window before, a standard deviation
+)
+_LONGER = 2.0  # times as long ago each further window ends,
+_SHOWN = 0.08  # of how long the rig remembers: what is longer ago is one window
+_SURE = 0.1  # of what earlier logs left: by what it may be off where they are all that was
+_REST = 0.3  # of a rest of unknown length: by what it may be longer, a standard deviation
 _EXACT = 1e-12  # of the output's level squared: less is no noise, but rounding
 _SEEN = 1e-3  # of the output's largest magnitude, in root mean square: less does not show
 
@@ -39,9 +44,16 @@ def begun_session(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...
     is.
 
     Begins that leave the refitted rig no better than a rest does are none; and what earlier experiments left
-    has to bring the refitted rig closer.
+    has to bring the refitted rig closer. Where logs begin elsewhere than at 0 they are asked for it, too: a
+    fractional actuator remembers more than a few steps tell.
     """
-    return with_recalled(rig, _told(rig, logs), lambda found: _refitted(rig, found)[1])
+
+    def left(session: Sequence[Experiment]) -> float:
+        return _refitted(rig, session)[1]
+
+    found = with_recalled(rig, _told(rig, logs), left)
+    estimated = any(not begin.known for log in found[1:] for begin in log.begins.values())
+    return with_recalled(rig, found, left, held=True) if estimated else found
 
 
 def _told(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
@@ -56,10 +68,14 @@ def _told(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
     return found if better else tuple(logs)
 
 
-def begun_with(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
-    """The experiments with their begins told anew by the rig with the effects ``placed`` in it; a session at
-    rest as it is."""
-    return begun(rig, logs, placed) if any(log.begins or log.stands for log in logs) else tuple(logs)
+def begun_with(
+    rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment], closely: bool = False
+) -> tuple[Experiment, ...]:
+    """The experiments with their begins told anew by the rig with the effects ``placed`` in it, ``closely``
+    where these are all there are; a session at rest as it is."""
+    if not any(log.begins or log.stands for log in logs):
+        return tuple(logs)
+    return begun(rig, logs, placed, closely)
 
 
 def _refitted(rig: Rig, logs: Sequence[Experiment]) -> tuple[Rig, float]:
@@ -79,7 +95,7 @@ def loosened(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Segment:
     if not segment.run.begins:
         return segment
     columns, fed = [], segment.fed
-    past = memory(rig, logs) if any(log.paused for log in logs) else 0.0
+    past = memory(rig, logs)
     for number, ((first, last), begin) in enumerate(zip(fed.run.spans, fed.run.begins)):
         for way in () if begin.at_rest else _ways(rig, fed, logs[: number + 1], past):
             column = np.zeros(len(fed.x))
@@ -103,11 +119,11 @@ def _ways(rig: Rig, segment: Segment, logs: Sequence[Experiment], past: float) -
 
     begin, changed = segment.run.begins[len(earlier)], []
     if not begin.known:
-        base = made(begin)
-        changed += [made(other) - base for other in _beside(begin, _LEVEL * segment.level_in)]
+        base, step = made(begin), _LEVEL * segment.level_in
+        changed += [made(other) - base for other in _beside(begin, step, h, _SHOWN * past)]
     if earlier and log.paused:
         now, *longer = (made(b) for b in _rested(log, earlier, segment.entry, past))
-        changed += [(now - made(REST)) * (_LEVEL if begin.known else 1.0), *(left - now for left in longer)]
+        changed += [(now - made(REST)) * (_SURE if begin.known else 1.0), *(left - now for left in longer)]
     if not changed:
         return np.zeros((0, last - first))
     _, sizes, axes = np.linalg.svd(np.stack(changed), full_matrices=False)
@@ -119,18 +135,16 @@ def _rested(log: Experiment, earlier: Sequence[Experiment], role: str, past: flo
     """What earlier experiments left of a signal, where no clock says how long the rig rested after them: by
     the rest that is taken, and by longer ones."""
     pause = log.start - max(map(ended, earlier))
-    for longer in (0.0, _TIME - 1.0, 1.0):
+    for longer in (0.0, _REST, 1.0):
         yield begin_after(replace(log, start=log.start + longer * pause), earlier, role, past)
 
 
-def _beside(begin: Begin, step: float) -> Iterator[Begin]:
-    """The begin with each of its numbers a standard deviation off. One that another signal's past made has
-    two: how far the signal was from where it is, and how long ago."""
-    if begin.carried:
-        yield stretched(begin, _TIME)
-        yield replace(begin, ago=tuple(t * _TIME for t in begin.ago))
-        return
-    for k in range(len(begin.levels)):
-        yield replace(begin, levels=tuple(v + step * (i == k) for i, v in enumerate(begin.levels)))
-    for k in range(len(begin.ago)):
-        yield replace(begin, ago=tuple(t * (_TIME if i == k else 1.0) for i, t in enumerate(begin.ago)))
+def _beside(begin: Begin, step: float, h: float, shown: float) -> Iterator[Begin]:
+    """The begin with its signal a ``step`` higher in each of several windows before the log, the longer the
+    longer they are ago, up to ``shown`` s, and ahead of that: a few levels are the simplest past that suits
+    the data, not what was."""
+    late, early = 0.0, h
+    while late < shown:
+        yield raised(begin, step, early, late)
+        late, early = early, _LONGER * early
+    yield raised(begin, step, np.inf, late)
