@@ -46,6 +46,7 @@ from focgen.progress import step
 from focgen.replaced import check_own
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.effects import library
+from focgen.rig.initial import in_windows
 from focgen.rig.plausibility import doubts
 from focgen.rig.replay import experiments
 from focgen.rig.rig import Rig
@@ -101,7 +102,8 @@ def diagnose(
     explanations, session = _lasting(search, explanations, session)
     rigs = compose.compose(nominal, explanations, session)
     explanations, rigs, session = _carried_on(search, explanations, rigs, session)
-    session = begun_with(rigs.fitted, rigs.placed, session, closely=True)
+    session = begun_with(rigs.fitted, rigs.placed, session)
+    session = in_windows(rigs.fitted, session, rigs.placed)
     rigs, diagnosis, evidence = conclude(nominal, session, rigs, explanations, ran, only is not None)
     proposed = propose(nominal, session, explanations, diagnosis.causes)
     diagnosis = replace(

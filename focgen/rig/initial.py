@@ -12,7 +12,7 @@ offset holds a rig off as a past does, but no larger one than what is left for g
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -77,15 +77,12 @@ _PASSING = replace(_IDLE, cost=0.05)
 No decay at rest shows the past then, so the past has to explain nearly all of what a rest leaves."""
 
 
-def begun(
-    rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] = (), closely: bool = False
-) -> tuple[Experiment, ...]:
+def begun(rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] = ()) -> tuple[Experiment, ...]:
     """The experiments, each with what every signal that enters a stage was before, where the data ask for
     it.
 
-    ``placed``: effects in the rig. ``closely``: the rig has the numbers that suit the logs, so that what few
-    steps before them leave is the past's. What integrates has no equilibrium to begin from: of a rig that
-    does is told where it stood, and, behind a regulator that does, what the stages there came from.
+    ``placed``: effects in the rig. What integrates has no equilibrium to begin from: of a rig that does is
+    told where it stood, and, behind a regulator that does, what the stages there came from.
     """
     if not all(map(len, logs)):
         return tuple(logs)
@@ -94,7 +91,27 @@ def begun(
         if rig.integrator == "regulator" and all(map(np.isfinite, _gains(behind))):
             logs = _driven(rig, behind, logs, placed)
         return tuple(standing(rig, log, placed, NOTE) for log in logs)
-    return _told(rig, logs, placed, tuple(ENTERS), closely)
+    return _told(rig, logs, placed, tuple(ENTERS))
+
+
+def in_windows(rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] = ()) -> tuple[Experiment, ...]:
+    """The experiments with the pasts that are estimated told in windows. What few steps leave is taken for
+    the pasts' own, so that the ``rig`` has to have the numbers that suit the logs, and be with all that is
+    ``placed`` in it."""
+    begins = [begin for log in logs for begin in log.begins.values()]
+    if all(begin.known for begin in begins) or not all(map(np.isfinite, _gains(rig))):
+        return tuple(logs)
+    sizes = Magnitudes.of(rig, logs)
+    return tuple(_in_windows(rig, log, placed, sizes) for log in logs)
+
+
+def _in_windows(rig: Rig, log: Experiment, placed: Sequence[Placed], sizes: Magnitudes) -> Experiment:
+    closer = {
+        entry: _Setting(rig, log, entry, placed, sizes).in_windows(begin)
+        for entry, begin in log.begins.items()
+        if not begin.known and sizes.behind(entry)
+    }
+    return replace(log, begins={**log.begins, **closer}) if closer else log
 
 
 def _driven(
@@ -109,38 +126,27 @@ def _driven(
 
 
 def _told(
-    rig: Rig,
-    logs: Sequence[Experiment],
-    placed: Sequence[Placed],
-    entries: Sequence[str],
-    closely: bool = False,
+    rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed], entries: Sequence[str]
 ) -> tuple[Experiment, ...]:
     """The experiments with what the signals were before that enter a stage, those of the ``entries`` that are
     logged."""
     scales = Magnitudes.of(rig, logs)
     logged = [role for role in entries if role in scales.sizes and scales.behind(role)]
-    return tuple(_begun(rig, log, placed, logged, scales, closely) for log in logs)
+    return tuple(_begun(rig, log, placed, logged, scales) for log in logs)
 
 
 def _begun(
-    rig: Rig,
-    log: Experiment,
-    placed: Sequence[Placed],
-    entries: Iterable[str],
-    scales: Magnitudes,
-    closely: bool,
+    rig: Rig, log: Experiment, placed: Sequence[Placed], entries: Iterable[str], scales: Magnitudes
 ) -> Experiment:
-    told = any(begin.after is not None for begin in log.begins.values())  # by earlier logs
-    if any(begin.known for begin in log.begins.values()) or (told and not closely):
-        return log
+    if any(begin.known or begin.after is not None for begin in log.begins.values()):
+        return log  # earlier logs tell
     if len(log) < 2 * FIRST or not all(np.all(np.isfinite(log[role])) for role in scales.sizes):
         return log
     found: dict[str, Begin] = {}
     for entry in entries:
         setting = _Setting(rig, log, entry, placed, scales)
-        found[entry] = log.before(entry) if told else setting.told(found)
-        if closely and not found[entry].at_rest:
-            found[entry] = setting.in_windows(found[entry])
+        told = [setting.told_by(ahead, begin) for ahead, begin in found.items() if begin.ago]
+        found[entry] = setting.chosen([t for tries in told for t in tries])
     found = {entry: begin for entry, begin in found.items() if not begin.at_rest}
     notes = tuple(note for note in log.notes if note != NOTE)
     return replace(log, begins=found, notes=(*notes, NOTE) if found else notes)
@@ -216,11 +222,6 @@ class _Setting:
         made: Array = (raw - np.clip(mean, -offset, offset)) * self.counts
         return made
 
-    def told(self, found: Mapping[str, Begin]) -> Begin:
-        """The begin, where those of the entries ahead are ``found``."""
-        told = [self._told_by(ahead, begin) for ahead, begin in found.items() if begin.ago]
-        return self._chosen([t for tries in told for t in tries])
-
     def in_windows(self, begin: Begin) -> Begin:
         """The begin with what the input was before in windows, the longer the longer they are ago, each as
         near to what it is there as the data let it be: few steps do not tell what a fractional actuator
@@ -240,7 +241,7 @@ class _Setting:
         raw = self._missed(begin)
         return Try(begin, free, raw, raw * self.counts)
 
-    def _told_by(self, ahead: str, begin: Begin) -> Iterator[Try]:
+    def told_by(self, ahead: str, begin: Begin) -> Iterator[Try]:
         """The past that the signal ``ahead`` makes of the input, where that one's is ``begin``: as it is, and
         so many times as far from where the log begins as suits best."""
         leaves = STAGES[STAGES.index(ENTERS[self.entry]) - 1]
@@ -250,7 +251,7 @@ class _Setting:
         yield base
         yield self.at(stretched(base.begin, float(np.clip(times, *_TIMES_AS_FAR))), 1)
 
-    def _chosen(self, further: Sequence[Try]) -> Begin:
+    def chosen(self, further: Sequence[Try] = ()) -> Begin:
         """The begin that the data ask for, of all kinds and the ``further`` ones."""
         rest, asked = self.at(REST, 0), self.asked
         noise = np.array([_white(y) for y in self.y.T])
@@ -262,7 +263,7 @@ class _Setting:
             return float(np.linalg.norm(t.first[moved]) / np.linalg.norm(rest.first[moved]))
 
         most = asked.cost * rest.cost
-        tries = [t for t in (*further, *self._tries()) if off(t) < asked.mended and t.cost < most]
+        tries = [t for t in (*further, *self.tries()) if off(t) < asked.mended and t.cost < most]
         if not tries:
             return REST
         sure = np.max(rest.first) > asked.far and min(map(off, tries)) < asked.surely
@@ -288,7 +289,7 @@ class _Setting:
 
     # -- candidates, from the simplest on -------------------------------------------------------------------
 
-    def _tries(self) -> list[Try]:
+    def tries(self) -> list[Try]:
         """The best of each kind of begin but a rest."""
         held = self.at(Begin((self.level,)), 0)
         times = np.log(np.geomspace(_SOONEST * self.h, self.longest, _TIMES))

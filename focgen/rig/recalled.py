@@ -241,7 +241,8 @@ def begin_after(
     while edges[-1] < ago[seen].max():
         edges.append(edges[-1] * (1.0 + _WIDTH) + log.sample_time)
     sums, _ = np.histogram(ago[seen], edges, weights=x[seen])
-    means = sums * log.sample_time / np.diff(edges)
+    count = np.histogram(ago[seen], edges)[0] if rests else np.diff(edges) / log.sample_time
+    means = sums / np.maximum(count, 1)
     last = max(earlier, key=ended)
     since = float(last[role][-1]) if goes_on(log, earlier) else 0.0
     levels = (0.0, *map(float, means[::-1]), since)

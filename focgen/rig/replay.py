@@ -22,7 +22,7 @@ from focgen.logs.table import LARGEST
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.effects import Parameter, library
 from focgen.rig.engine import Chain, Placed, between_of
-from focgen.rig.initial import begun
+from focgen.rig.initial import begun, in_windows
 from focgen.rig.plausibility import doubts
 from focgen.rig.recalled import with_recalled
 from focgen.rig.response import check_bounded, longest
@@ -82,10 +82,18 @@ def replay(rig: RigLike, logs: Logs, from_: float | None = None, to: float | Non
 def _with_past(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
     """The experiments with what was before them: by their own beginnings, or by the logs of those before,
     where that brings the output closer."""
-    found = begun(rig, logs, placed_in(rig))
+    placed = placed_in(rig)
+    found = begun(rig, logs, placed)
     if not all("output" in log for log in logs):
         return found
-    return with_recalled(rig, found, lambda session: _left(rig, session), placed_in(rig))
+
+    def left(session: Sequence[Experiment]) -> float:
+        return _left(rig, session)
+
+    found = with_recalled(rig, found, left, placed)
+    if any(not begin.known for log in found for begin in log.begins.values()):
+        found = with_recalled(rig, found, left, placed, held=True)
+    return in_windows(rig, found, placed)
 
 
 def _lasting(rig: Rig, logs: tuple[Experiment, ...]) -> tuple[Experiment, ...]:

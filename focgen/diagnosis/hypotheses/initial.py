@@ -68,14 +68,10 @@ def _told(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
     return found if better else tuple(logs)
 
 
-def begun_with(
-    rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment], closely: bool = False
-) -> tuple[Experiment, ...]:
-    """The experiments with their begins told anew by the rig with the effects ``placed`` in it, ``closely``
-    where these are all there are; a session at rest as it is."""
-    if not any(log.begins or log.stands for log in logs):
-        return tuple(logs)
-    return begun(rig, logs, placed, closely)
+def begun_with(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
+    """The experiments with their begins told anew by the rig with the effects ``placed`` in it; a session at
+    rest as it is."""
+    return begun(rig, logs, placed) if any(log.begins or log.stands for log in logs) else tuple(logs)
 
 
 def _refitted(rig: Rig, logs: Sequence[Experiment]) -> tuple[Rig, float]:

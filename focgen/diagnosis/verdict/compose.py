@@ -15,6 +15,7 @@ from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import library
 from focgen.rig.engine import Chain, Placed, between_of
+from focgen.rig.initial import in_windows
 from focgen.rig.recalled import recalled, with_recalled
 from focgen.rig.replay import effect_tables, simulate_session
 from focgen.rig.rig import Rig
@@ -82,6 +83,8 @@ def _moved(rig: Rig, fits: Sequence[Fit]) -> Rig:
 
 
 def _gap(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment]) -> float:
+    """The mean square error of the output, of each rig from the pasts that suit it best."""
+    logs = in_windows(rig, logs, placed)
     return mean_square(logs, simulated(rig, placed, logs))
 
 
