@@ -19,7 +19,7 @@ from focgen.rig.effects import Run
 from focgen.rig.kernels import BALANCED
 
 _ALIKE = 2.0  # samples: a log in means of several ends and begins within one of its own
-_SLACK = 1e-6  # samples: rounding of a clock
+_SLACK = 1e-6  # samples, or of a signal: rounding of a clock, and of means
 _WIDER = 1.1  # times as long ago as it is, the earliest window of a past may begin
 _EXTENDED: WeakKeyDictionary[Run, tuple[Run, Array]] = WeakKeyDictionary()
 
@@ -80,17 +80,18 @@ def _gaps(run: Run) -> list[float | None]:
     for (a, _), begin, (ahead, _), earlier in zip(spans[1:], run.begins[1:], spans, run.begins):
         gap, since = float(clock[a] - clock[a - 1]), float(clock[a] - clock[ahead])
         followed = begin.after is not None and abs(gap - begin.after) < _ALIKE * run.h
-        followed = followed and _is_still(begin, gap - run.h)
+        followed = followed and _is_still(begin, gap - 0.5 * run.h)
         # all that was before is in the one ahead, or has been put ahead of that
-        whole = earlier.known or max(begin.ago, default=0.0) <= _WIDER * since + _ALIKE * run.h
+        told = earlier.known or earlier.after is not None
+        whole = told or max(begin.ago, default=0.0) <= _WIDER * since + _ALIKE * run.h
         found.append(gap if followed and whole else None)
     return found
 
 
 def _is_still(begin: Begin, since: float) -> bool:
     """Whether a signal was since so many s ago what it was last."""
-    later = (level for level, t in zip(begin.levels[1:], begin.ago) if t < since)
-    return all(level == begin.levels[-1] for level in later)
+    later = [level for level, t in zip(begin.levels[1:], begin.ago) if t < since]
+    return not later or bool(np.ptp([*later, begin.levels[-1]]) <= _SLACK * np.max(np.abs(begin.levels)))
 
 
 def _rests(begin: Begin, gap: float | None) -> int:

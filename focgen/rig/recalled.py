@@ -170,21 +170,24 @@ def _held(log: Experiment, earlier: Sequence[Experiment], role: str, past: float
     """An input's past, had it been between any two logs where the later one begins, but since the last of the
     ``earlier`` ones, where ``own``, what its log's begin tells; and before the first what that one tells."""
     begins = [other.before(role) for other in (*earlier, log)]
-    behind = (*earlier[1:],) if own else (*earlier[1:], log)
-    rests = [_rest(log, a, b, role) for a, b in zip(earlier, behind)]
-    begin = begin_after(log, earlier, role, past, rests)
-    if not begin.ago:
+    if log.start - max(map(ended, earlier)) > past:
         return begins[-1]
+    behind = (*earlier[1:],) if own else (*earlier[1:], log)
+    rests = [_rest(log, a, b, role, past) for a, b in zip(earlier, behind)]
+    begin = begin_after(log, earlier, role, past, rests)
     since = [t for t in begins[-1].ago if t < begin.ago[-1]] if own else []
     levels = begins[0].levels[0], *begin.levels[1:-1], *begins[-1].levels[-1 - len(since) :]
     return Begin(levels, (*begin.ago, *since), after=begin.after)
 
 
-def _rest(log: Experiment, before: Experiment, behind: Experiment, role: str) -> tuple[Array, Array]:
-    """How long before a ``log``, s, the samples would have been between two others, and what they are where
-    the input was then what it is as the later one begins."""
+def _rest(
+    log: Experiment, before: Experiment, behind: Experiment, role: str, past: float
+) -> tuple[Array, Array]:
+    """How long before a ``log``, s, up to ``past``, the samples would have been between two others, and what
+    they are where the input was then what it is as the later one begins."""
     h = log.sample_time
-    ago = np.arange(log.start - ended(before) - h, log.start - behind.start + 0.5 * h, -h)
+    first = min(log.start - ended(before) - h, past)
+    ago = np.arange(first, log.start - behind.start + 0.5 * h, -h)
     return ago, np.full(len(ago), behind.before(role).levels[-1])
 
 

@@ -58,6 +58,14 @@ def test_between_two_logs_the_input_is_what_the_later_one_begins_with():
     assert not begin.known  # nobody has seen the gap
 
 
+def test_in_a_row_the_rig_goes_on_through_the_gap():
+    """As it did, sample for sample, and not by means over windows."""
+    logs = logs_of()
+    made = simulate_session(RIG, recalled(RIG, logs, held=()))
+    for log, one in zip(logs, made):
+        assert np.max(np.abs(log["output"] - one["output"])) < 1e-9
+
+
 def test_a_step_since_the_last_log_is_kept_where_its_own_begin_tells_of_it():
     logs, step = logs_of(), Begin((0.9, IDLE), (2.0,))
     moved = [*logs[:2], replace(logs[2], begins={"pressure": step})]
@@ -71,6 +79,14 @@ def test_a_step_since_the_last_log_is_kept_where_its_own_begin_tells_of_it():
     )
     assert np.max(np.abs(alone - in_a_row)) < 0.01
     assert np.max(np.abs(alone - logs[2]["output"])) > 0.1
+
+
+def test_a_night_between_two_logs_takes_no_memory():
+    logs = logs_of()
+    later = replace(logs[2], start=logs[2].start + 1e9)
+    begin = recalled(RIG, [*logs[:2], later], held=())[2].before("pressure")
+    assert begin.levels == pytest.approx([IDLE] * len(begin.levels))
+    assert len(begin.levels) < 100
 
 
 @pytest.mark.parametrize("seed", range(5))

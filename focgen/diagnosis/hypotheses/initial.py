@@ -28,9 +28,7 @@ from focgen.rig.rig import Rig
 
 _AGAIN = 2  # times that the rig is refitted and the begins told anew
 _ROUNDS = 6  # of a refit
-_LEVEL = (
-    0.3  # of the input's level: by what it may have been another in a window before, a standard deviation
-)
+_LEVEL = 0.3  # of the input's level: a standard deviation of what it was in a window before
 _LONGER = 2.0  # times as long ago each further window ends,
 _SHOWN = 0.08  # of how long the rig remembers: what is longer ago is one window
 _SURE = 0.1  # of what earlier logs left: by what it may be off where they are all that was
