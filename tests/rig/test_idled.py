@@ -9,8 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from focgen.diagnosis.hypotheses.initial import begun_session
 from focgen.logs.begin import Begin
 from focgen.logs.experiment import Experiment
+from focgen.logs.read import in_session_order
 from focgen.rig.carried import raised
 from focgen.rig.initial import in_windows
 from focgen.rig.recalled import recalled
@@ -56,6 +58,27 @@ def test_between_two_logs_the_input_is_what_the_later_one_begins_with():
     since = [level for level, t in zip(begin.levels[1:], begin.ago) if t < GAP * H]
     assert since == pytest.approx([IDLE] * len(since))
     assert not begin.known  # nobody has seen the gap
+
+
+@pytest.mark.parametrize("clock", ["one", "of its own"])
+def test_a_session_is_told_by_its_earlier_logs_from_the_start(clock):
+    """Before any effect is looked for, and where no clock says how long the rig idled, too."""
+    rng, noise = np.random.default_rng(3), 0.003
+    logs = [
+        replace(
+            log,
+            begins={},
+            signals={**log.signals, "output": log["output"] + rng.normal(0.0, noise, len(ONE))},
+        )
+        for log in logs_of()
+    ]
+    if clock != "one":
+        logs = in_session_order([Experiment(log.name, H, log.signals) for log in logs])
+    told = begun_session(RIG, logs)
+    made = simulate_session(RIG, told)
+    for log, one in zip(told[1:], made[1:]):
+        assert np.std(log["output"] - one["output"]) < 1.05 * noise
+    assert all(log.before("pressure").after is not None for log in told[1:])
 
 
 def test_in_a_row_the_rig_goes_on_through_the_gap():
