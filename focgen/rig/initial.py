@@ -225,21 +225,21 @@ class _Setting:
     def in_windows(self, begin: Begin) -> Begin:
         """The begin with what the input was before in windows, the longer the longer they are ago, each as
         near to what it is there as the data let it be: few steps do not tell what a fractional actuator
-        remembers of many."""
+        remembers of many. Every signal counts by what is left of it, an offset like all else, and none may
+        be left with more."""
         ends = self.h * 2.0 ** np.arange(max(np.ceil(np.log2(self.longest / self.h)), 1.0) + 1.0)
         spans = list(zip([*ends, np.inf], [0.0, *ends]))
         step, off = _WINDOW * self.reach, self._missed(begin)
+        trust = self.counts / np.maximum(np.sqrt(np.mean((off * self.counts) ** 2, axis=0)), 1e-300)
         rows = [self._missed(raised(begin, step, *span)) - off for span in spans]
-        by, free = nearest(np.stack([(row * self.counts).ravel() for row in rows]), off * self.counts)
+        by, free = nearest(np.stack([(row * trust).ravel() for row in rows]), off * trust)
         found = begin
         for span, size in zip(spans, by):
             found = raised(found, step * float(size), *span)
-        return likeliest([self._at_once(begin, 0), self._at_once(found, free)], 0.0).begin
-
-    def _at_once(self, begin: Begin, free: int) -> Try:
-        """The same as :meth:`at`, but an offset is no less left than all else."""
-        raw = self._missed(begin)
-        return Try(begin, free, raw, raw * self.counts)
+        left = self._missed(found)
+        tries = [Try(begin, 0, off, off * trust), Try(found, free, left, left * trust)]
+        closer = np.all(np.sum(left**2, axis=0) <= np.sum(off**2, axis=0))
+        return likeliest(tries, 0.0).begin if closer else begin
 
     def told_by(self, ahead: str, begin: Begin) -> Iterator[Try]:
         """The past that the signal ``ahead`` makes of the input, where that one's is ``begin``: as it is, and
