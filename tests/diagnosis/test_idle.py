@@ -74,16 +74,20 @@ def found_in(seed, clock):
     return diagnose(rig, logs, pictures=False)
 
 
-@pytest.mark.parametrize(("seed", "clock"), [(1, "of its own"), (2, "one")])
-def test_a_healthy_actuator_that_idled_at_a_level_has_no_effect(seed, clock):
+@pytest.mark.parametrize("clock", ["one", "of its own"])
+@pytest.mark.parametrize("seed", [1, 11])
+def test_a_healthy_actuator_that_idled_at_a_level_leaves_the_noise(seed, clock):
     found = found_in(seed, clock)
     assert not found.causes
-    assert found.verdict in ("none", "parameters")
+    assert found.verdict == "parameters"
     assert found.gap.refitted < 1.3 * found.gap.floor
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("clock", ["one", "of its own"])
-@pytest.mark.parametrize("seed", range(3, 9))
+@pytest.mark.parametrize(
+    "seed", [3, *(pytest.param(n, marks=pytest.mark.long) for n in (2, *range(4, 11), 12))]
+)
 def test_no_healthy_actuator_is_at_fault(seed, clock):
-    assert not found_in(seed, clock).causes
+    found = found_in(seed, clock)
+    assert not found.causes
+    assert found.gap.refitted < 1.6 * found.gap.floor
