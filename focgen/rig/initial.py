@@ -46,6 +46,7 @@ _NOTHING = 0.06  # of the input's largest magnitude: what counts as 0
 _LITTLE = 0.01  # of it: less, held before a log, does not show
 _BEYOND = 0.2  # of it: by so much earlier levels may leave the input's range
 _WINDOW = 0.5  # of it: by what it may have been another in a window before, a standard deviation
+_PARTS = (1.0, 0.5, 0.25)  # of the way that a rig would ask for which is linear
 _TIMES_AS_FAR = (0.5, 2.0)  # a past that another signal's made may be from where the log begins
 _NOWHERE = 1e3  # of a signal's largest magnitude: where a spring that gives way has nothing to hold it
 _SHOWN = 0.3  # of a response time at 0: what is shorter shows no decay
@@ -233,13 +234,15 @@ class _Setting:
         trust = self.counts / np.maximum(np.sqrt(np.mean((off * self.counts) ** 2, axis=0)), 1e-300)
         rows = [self._missed(raised(begin, step, *span)) - off for span in spans]
         by, free = nearest(np.stack([(row * trust).ravel() for row in rows]), off * trust)
-        found = begin
-        for span, size in zip(spans, by):
-            found = raised(found, step * float(size), *span)
-        left = self._missed(found)
-        tries = [Try(begin, 0, off, off * trust), Try(found, free, left, left * trust)]
-        closer = np.all(np.sum(left**2, axis=0) <= np.sum(off**2, axis=0))
-        return likeliest(tries, 0.0).begin if closer else begin
+        tries = [Try(begin, 0, off, off * trust)]
+        for part in _PARTS:
+            found = begin
+            for span, size in zip(spans, by):
+                found = raised(found, part * step * float(size), *span)
+            left = self._missed(found)
+            if np.all(np.sum(left**2, axis=0) <= np.sum(off**2, axis=0)):
+                tries.append(Try(found, free, left, left * trust))
+        return likeliest(tries, 0.0).begin
 
     def told_by(self, ahead: str, begin: Begin) -> Iterator[Try]:
         """The past that the signal ``ahead`` makes of the input, where that one's is ``begin``: as it is, and
