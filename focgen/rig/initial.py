@@ -23,7 +23,7 @@ from focgen.logs.begin import REST, Begin
 from focgen.logs.between import white_level
 from focgen.logs.experiment import Experiment
 from focgen.rig.carried import FIRST, carried, raised, stretched
-from focgen.rig.effects import Run
+from focgen.rig.effects import Run, library
 from focgen.rig.engine import Chain, Placed, between_of
 from focgen.rig.magnitudes import Magnitudes
 from focgen.rig.rig import UNITY, LinearActuator, Rig
@@ -98,19 +98,27 @@ def begun(rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] = ()) -
 def in_windows(rig: Rig, logs: Sequence[Experiment], placed: Sequence[Placed] = ()) -> tuple[Experiment, ...]:
     """The experiments with the pasts that are estimated told in windows. What few steps leave is taken for
     the pasts' own, so that the ``rig`` has to have the numbers that suit the logs, and be with all that is
-    ``placed`` in it."""
+    ``placed`` in it. What wears, or lies where its last turn was, asks for the earlier logs themselves."""
+    keeps = any(p.form.leaves or library()[p.effect].remembers for p in placed)
     begins = [begin for log in logs for begin in log.begins.values()]
-    if all(begin.known for begin in begins) or not all(map(np.isfinite, _gains(rig))):
+    if not any(_is_free(begin, keeps) for begin in begins) or not all(map(np.isfinite, _gains(rig))):
         return tuple(logs)
     sizes = Magnitudes.of(rig, logs)
-    return tuple(_in_windows(rig, log, placed, sizes) for log in logs)
+    return tuple(_in_windows(rig, log, placed, sizes, keeps) for log in logs)
 
 
-def _in_windows(rig: Rig, log: Experiment, placed: Sequence[Placed], sizes: Magnitudes) -> Experiment:
+def _is_free(begin: Begin, keeps: bool) -> bool:
+    """Whether a past is estimated; where the rig ``keeps`` what was, and no earlier log tells of it."""
+    return not begin.known and not (keeps and begin.after is not None)
+
+
+def _in_windows(
+    rig: Rig, log: Experiment, placed: Sequence[Placed], sizes: Magnitudes, keeps: bool
+) -> Experiment:
     closer = {
         entry: _Setting(rig, log, entry, placed, sizes).in_windows(begin)
         for entry, begin in log.begins.items()
-        if not begin.known and sizes.behind(entry)
+        if _is_free(begin, keeps) and sizes.behind(entry)
     }
     return replace(log, begins={**log.begins, **closer}) if closer else log
 

@@ -14,6 +14,8 @@ from focgen.logs.begin import Begin
 from focgen.logs.experiment import Experiment
 from focgen.logs.read import in_session_order
 from focgen.rig.carried import raised
+from focgen.rig.effects import library
+from focgen.rig.engine import Placed
 from focgen.rig.initial import in_windows
 from focgen.rig.recalled import recalled
 from focgen.rig.replay import simulate_session
@@ -137,6 +139,18 @@ def test_a_past_that_earlier_logs_show_is_left_as_it_is():
         replace(log, begins={"pressure": replace(log.before("pressure"), known=True)}) for log in logs_of()
     ]
     assert all(a is b for a, b in zip(logs, in_windows(RIG, logs)))
+
+
+def test_what_wears_asks_for_the_earlier_logs_themselves():
+    """Means over windows wear a rubber less than what was: it goes on from the log before instead."""
+    softening = library()["softening"]
+    form = next(form for form in softening.forms if form.name == "work")
+    placed = Placed("softening", form, "actuator", (0.5, 5.0))
+    logs = list(recalled(RIG, logs_of(), held=()))
+    later = logs[2]["output"] * 1.1  # a past could make up for some of it
+    logs[2] = replace(logs[2], signals={**logs[2].signals, "output": later})
+    assert in_windows(RIG, logs)[2].begins != logs[2].begins
+    assert [log.begins for log in in_windows(RIG, logs, [placed])[1:]] == [log.begins for log in logs[1:]]
 
 
 def test_a_signal_is_raised_in_its_window_only():
