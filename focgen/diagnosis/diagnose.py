@@ -30,7 +30,7 @@ from focgen.diagnosis.hypotheses.input_covariance import input_covariance
 from focgen.diagnosis.model import Diagnosis
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.decimate import decimated
-from focgen.diagnosis.problem.segments import cuts, make
+from focgen.diagnosis.problem.segments import Segment, cuts, make
 from focgen.diagnosis.problem.smooth import freed, is_explained, slow_rest, strays
 from focgen.diagnosis.proposals.next_experiment import NEXT, propose
 from focgen.diagnosis.verdict import compose
@@ -48,8 +48,10 @@ from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.effects import library
 from focgen.rig.initial import in_windows
 from focgen.rig.plausibility import doubts
+from focgen.rig.recalled import all_ahead
 from focgen.rig.replay import experiments
 from focgen.rig.rig import Rig
+from focgen.rig.session import run_of
 
 _RIVALS = 3  # of what was found that may tell how the logs begin
 _CARRIED = 2  # times that findings are made anew with what they left in later experiments
@@ -98,6 +100,7 @@ def diagnose(
     explanations = explain_all(nominal, session, NUMBERS.nats, only, bootstrap)
     nominal = explanations[0].with_intersample(nominal)
     search = _Search(nominal, only, bootstrap)
+    explanations, session = _slow(search, explanations, session)
     explanations, session = _told_by_another(search, explanations, session)
     explanations, session = _lasting(search, explanations, session)
     rigs = compose.compose(nominal, explanations, session)
@@ -138,24 +141,53 @@ class _Search:
         return again if _left_by(again) < _left_by(explanations) else None
 
 
+def _slow(
+    search: _Search, explanations: tuple[Explanation, ...], session: tuple[Experiment, ...]
+) -> tuple[tuple[Explanation, ...], tuple[Experiment, ...]]:
+    """The findings and the session, made anew with all earlier logs ahead where what is slow leaves far less
+    by these than what was found: where every log is taken to begin at rest it is lost to a drift."""
+    clocked = not any(log.paused or log.stands for log in session)
+    logs = all_ahead(search.nominal, session) if clocked and len(session) > 1 else session
+    if search.only is not None or not _begin_elsewise(logs, session):
+        return explanations, session
+    for e in explanations:
+        if not e.causes and e.predictability.share <= NUMBERS.left:
+            continue
+        segment = e.segment.anew(run=run_of(logs, e.segment.entry))
+        slow = [n for n, family in library().items() if family.slow and family.stage in segment.stages]
+        left = [_left_alone(search.nominal, segment, logs, name) for name in slow]
+        if left and min(left) < NUMBERS.unlikely * e.square:
+            step("what is slow, from log to log")
+            again = search.better(explanations, logs)
+            return (again, logs) if again else (explanations, session)
+    return explanations, session
+
+
+def _left_alone(nominal: Rig, segment: Segment, logs: Sequence[Experiment], name: str) -> float:
+    """The mean square that a family leaves by itself."""
+    return explain(nominal, segment, logs, NUMBERS.nats, [name]).square
+
+
 def _told_by_another(
     search: _Search, explanations: tuple[Explanation, ...], session: tuple[Experiment, ...]
 ) -> tuple[tuple[Explanation, ...], tuple[Experiment, ...]]:
-    """The findings and the session, made anew with the begins that a rival tells where it leaves far less by
-    these than what was found does by its own. The pasts were told without any effect, and such a past
-    misleads one that remembers. Where it leaves but a little less, its begins are those that suit it."""
+    """The findings and the session, made anew with the begins that a rival tells, or with what carries on in
+    it from one log to the next, where it leaves far less by these than what was found does by its own. The
+    pasts were told without any effect, and such a past misleads one that remembers. Where it leaves but a
+    little less, its begins are those that suit it."""
     estimated = any(not b.known for log in session for b in log.begins.values())
-    if search.only is not None or not estimated:
+    if search.only is not None or not (estimated or len(session) > 1):
         return explanations, session
     for number in range(len(explanations)):
         e = explanations[number]
         others = list(_others(search.nominal, e, session))
         tried = [e.best, *others] if others else []
-        told = [_begun_by(search.nominal, explanations, number, fit, session) for fit in tried]
-        left = [np.mean(begun_as(e, fit, logs).weighed ** 2) for fit, logs in zip(tried, told)]
+        told = [(fit, _begun_by(search.nominal, explanations, number, fit, session)) for fit in tried]
+        told += [(fit, _carried_by(search.nominal, explanations, number, fit, session)) for fit in others]
+        left = [np.mean(begun_as(e, fit, logs).weighed ** 2) for fit, logs in told]
         if left and min(left) < NUMBERS.unlikely * left[0]:
             step("how the logs begin")
-            logs = told[int(np.argmin(left))]
+            logs = told[int(np.argmin(left))][1]
             again = search.better(explanations, logs)
             explanations, session = (again, logs) if again else (explanations, session)
     return explanations, session
@@ -180,9 +212,24 @@ def _begun_by(
     session: Sequence[Experiment],
 ) -> tuple[Experiment, ...]:
     """The session with its begins told by the rig as explained, but for one segment by another fit."""
-    others = [replace(e, best=of) if k == number else e for k, e in enumerate(explanations)]
-    rigs = compose.compose(nominal, others, session)
+    rigs = compose.compose(nominal, _with_other(explanations, number, of), session)
     return begun_with(rigs.fitted, rigs.placed, session)
+
+
+def _carried_by(
+    nominal: Rig,
+    explanations: Sequence[Explanation],
+    number: int,
+    of: Fit,
+    session: Sequence[Experiment],
+) -> tuple[Experiment, ...]:
+    """The session with what carries on in the rig as explained, but for one segment by another fit."""
+    others = _with_other(explanations, number, of)
+    return _carried(compose.compose(nominal, others, session), others, session)
+
+
+def _with_other(explanations: Sequence[Explanation], number: int, of: Fit) -> list[Explanation]:
+    return [replace(e, best=of) if k == number else e for k, e in enumerate(explanations)]
 
 
 def _lasting(
@@ -211,9 +258,7 @@ def _carried_on(
     less is left for it: what it left looked like another effect, or like a fault at a begin. A refit of what
     was found shows first whether that is worth a search."""
     for _ in range(_CARRIED):
-        carried = compose.carried_on(rigs, session)
-        if not _begin_elsewise(carried, session):
-            carried = compose.held_on(rigs, session, partial(_square_left, explanations))
+        carried = _carried(rigs, explanations, session)
         if not _begin_elsewise(carried, session) or _nats_gained(explanations, carried) < NUMBERS.nats:
             break
         step("what carries on from one log to the next")
@@ -222,6 +267,16 @@ def _carried_on(
             break
         explanations, rigs, session = again, compose.compose(search.nominal, again, carried), carried
     return explanations, rigs, session
+
+
+def _carried(
+    rigs: compose.Rigs, explanations: Sequence[Explanation], session: Sequence[Experiment]
+) -> tuple[Experiment, ...]:
+    """The session with what earlier logs left in what was found, at whatever level the rig rests."""
+    carried = compose.carried_on(rigs, session)
+    if _begin_elsewise(carried, session):
+        return carried
+    return compose.held_on(rigs, session, partial(_square_left, explanations))
 
 
 def _nats_gained(explanations: Sequence[Explanation], logs: Sequence[Experiment]) -> float:

@@ -128,6 +128,14 @@ def recalled(
     return found if _shows(rig, placed, logs, found, closer and held is None) else tuple(logs)
 
 
+def all_ahead(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
+    """The experiments with the earlier ones ahead of them, whether the rig has forgotten these or not: what
+    is slow in it has not. Rests longer than it remembers, and than all logs together, are forgotten by
+    that, too."""
+    past = max(memory(rig, logs), sum(len(log) * log.sample_time for log in logs))
+    return tuple(_recalled(log, _earlier(log, logs), past, False) for log in logs)
+
+
 def memory(rig: Rig, logs: Sequence[Experiment]) -> float:
     """How long ago, s, an input counts as 0. What a pump was told before is where it stood, which its log
     tells."""

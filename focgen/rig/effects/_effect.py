@@ -227,8 +227,9 @@ class Effect:
 
     ``needs`` is the identifiability check: what the experiments lack to show the effect, or None.
     ``bends``: its curves leave the gain at zero as it is, and change it elsewhere. ``remembers``: it stays
-    where an experiment left it, whatever rest follows. ``static``: what it changes depends on the level
-    alone, as the error of a nominal curve does.
+    where an experiment left it, whatever rest follows. ``slow``: what it was fed is in it long after the rig
+    has forgotten that. ``static``: what it changes depends on the level alone, as the error of a nominal
+    curve does.
     """
 
     name: str
@@ -241,6 +242,7 @@ class Effect:
     also: tuple[str, ...] = ()
     bends: bool = False
     remembers: bool = False
+    slow: bool = False
     static: bool = False
 
     @property

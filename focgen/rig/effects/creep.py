@@ -63,6 +63,7 @@ EFFECT = Effect(
     meaning="a slow further deformation under constant load, over tens of seconds to minutes",
     reveals="holds of a hundred seconds and recoveries as long",
     confused_with=("sensor_relaxation", "sensor_lag", "sensor_drift", "gain_drift", "softening"),
+    slow=True,
     needs=lambda e: None if e.hold > 8 else "no hold is long beside the rig's response: hold a level longer",
     forms=[
         Form("pole", "response", (_SHARE, _tau(6.0, 12.0, 60.0)), _pole, response=_pole_response),

@@ -74,6 +74,7 @@ EFFECT = Effect(
     meaning="the reading overshoots with strain rate, then relaxes",
     reveals="a step and a hold with the curvature logged: the reading falls while the curvature rests",
     confused_with=("creep", "sensor_lag", "sensor_drift", "sensor_hysteresis"),
+    slow=True,
     needs=lambda e: None if e.hold > 3 else "no hold is long beside the rig's response",
     forms=[
         Form("one_time", "strain", (_SHARE, _TIME), _one, response=_one_response),
