@@ -146,8 +146,7 @@ def _slow(
 ) -> tuple[tuple[Explanation, ...], tuple[Experiment, ...]]:
     """The findings and the session, made anew with all earlier logs ahead where what is slow leaves far less
     by these than what was found: where every log is taken to begin at rest it is lost to a drift."""
-    clocked = not any(log.paused or log.stands for log in session)
-    logs = all_ahead(search.nominal, session) if clocked and len(session) > 1 else session
+    logs = all_ahead(search.nominal, session)
     if search.only is not None or not _begin_elsewise(logs, session):
         return explanations, session
     for e in explanations:
@@ -181,9 +180,10 @@ def _told_by_another(
     for number in range(len(explanations)):
         e = explanations[number]
         others = list(_others(search.nominal, e, session))
-        tried = [e.best, *others] if others else []
-        told = [(fit, _begun_by(search.nominal, explanations, number, fit, session)) for fit in tried]
-        told += [(fit, _carried_by(search.nominal, explanations, number, fit, session)) for fit in others]
+        own = next(_told_by(search.nominal, explanations, number, e.best, session)) if others else ()
+        told = [(e.best, own)] if others else []
+        for fit in others:
+            told += [(fit, logs) for logs in _told_by(search.nominal, explanations, number, fit, session)]
         left = [np.mean(begun_as(e, fit, logs).weighed ** 2) for fit, logs in told]
         if left and min(left) < NUMBERS.unlikely * left[0]:
             step("how the logs begin")
@@ -204,32 +204,19 @@ def _others(nominal: Rig, e: Explanation, session: Sequence[Experiment]) -> Iter
             yield explain(nominal, e.segment, session, NUMBERS.nats, [name]).best
 
 
-def _begun_by(
+def _told_by(
     nominal: Rig,
     explanations: Sequence[Explanation],
     number: int,
     of: Fit,
     session: Sequence[Experiment],
-) -> tuple[Experiment, ...]:
-    """The session with its begins told by the rig as explained, but for one segment by another fit."""
-    rigs = compose.compose(nominal, _with_other(explanations, number, of), session)
-    return begun_with(rigs.fitted, rigs.placed, session)
-
-
-def _carried_by(
-    nominal: Rig,
-    explanations: Sequence[Explanation],
-    number: int,
-    of: Fit,
-    session: Sequence[Experiment],
-) -> tuple[Experiment, ...]:
-    """The session with what carries on in the rig as explained, but for one segment by another fit."""
-    others = _with_other(explanations, number, of)
-    return _carried(compose.compose(nominal, others, session), others, session)
-
-
-def _with_other(explanations: Sequence[Explanation], number: int, of: Fit) -> list[Explanation]:
-    return [replace(e, best=of) if k == number else e for k, e in enumerate(explanations)]
+) -> Iterator[tuple[Experiment, ...]]:
+    """The session as the rig tells it that is explained, but for one segment by another fit: with its begins,
+    and with what carries on in it."""
+    others = [replace(e, best=of) if k == number else e for k, e in enumerate(explanations)]
+    rigs = compose.compose(nominal, others, session)
+    yield begun_with(rigs.fitted, rigs.placed, session)
+    yield _carried(rigs, others, session)
 
 
 def _lasting(

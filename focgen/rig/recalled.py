@@ -70,6 +70,18 @@ def with_recalled(
     return best.logs if np.isfinite(best.left) and best.left < _RECALLED * left(logs) else tuple(logs)
 
 
+def with_earlier(
+    rig: Rig,
+    logs: Sequence[Experiment],
+    left: Callable[[Sequence[Experiment]], float],
+    placed: Sequence[Placed] = (),
+) -> tuple[Experiment, ...]:
+    """The experiments by :func:`with_recalled`, asked once more where some begin elsewhere than at 0."""
+    found = with_recalled(rig, logs, left, placed)
+    estimated = any(not begin.known for log in found[1:] for begin in log.begins.values())
+    return with_recalled(rig, found, left, placed, held=True) if estimated else found
+
+
 @dataclass(frozen=True)
 class _Tried:
     """A session with pauses of so many response times, its ``logs`` with what that puts ahead of them, what
@@ -131,7 +143,9 @@ def recalled(
 def all_ahead(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
     """The experiments with the earlier ones ahead of them, whether the rig has forgotten these or not: what
     is slow in it has not. Rests longer than it remembers, and than all logs together, are forgotten by
-    that, too."""
+    that, too. As they are where no clock tells how long ago those were, or in a rig that integrates."""
+    if any(log.paused for log in logs) or integrations(rig) or rig.integrator:
+        return tuple(logs)
     past = max(memory(rig, logs), sum(len(log) * log.sample_time for log in logs))
     return tuple(_recalled(log, _earlier(log, logs), past, False) for log in logs)
 

@@ -24,7 +24,7 @@ from focgen.rig.effects import Parameter, library
 from focgen.rig.engine import Chain, Placed, between_of
 from focgen.rig.initial import begun, in_windows
 from focgen.rig.plausibility import doubts
-from focgen.rig.recalled import with_recalled
+from focgen.rig.recalled import with_earlier
 from focgen.rig.response import check_bounded, longest
 from focgen.rig.rig import Rig
 from focgen.rig.session import joined, run_of
@@ -86,13 +86,7 @@ def _with_past(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
     found = begun(rig, logs, placed)
     if not all("output" in log for log in logs):
         return found
-
-    def left(session: Sequence[Experiment]) -> float:
-        return _left(rig, session)
-
-    found = with_recalled(rig, found, left, placed)
-    if any(not begin.known for log in found for begin in log.begins.values()):
-        found = with_recalled(rig, found, left, placed, held=True)
+    found = with_earlier(rig, found, lambda session: _left(rig, session), placed)
     return in_windows(rig, found, placed)
 
 

@@ -11,7 +11,7 @@ import pytest
 from focgen.diagnosis import diagnose as module
 
 
-@pytest.mark.parametrize("teller", ["_begun_by", "_carried_by"])
+@pytest.mark.parametrize("teller", ["begins", "what carries on"])
 @pytest.mark.parametrize(
     "left, asked", [(0.5, True), (0.69, True), (0.75, False), (0.94, False), (1.2, False)]
 )
@@ -23,9 +23,10 @@ def test_a_rival_tells_how_logs_begin_only_where_it_leaves_far_less(left, asked,
     again = []
     search = SimpleNamespace(only=None, nominal=None, better=lambda e, logs: again.append(logs))
     monkeypatch.setattr(module, "_others", lambda *_: [rival])
-    for name in ("_begun_by", "_carried_by"):
-        told = rival if name == teller else found
-        monkeypatch.setattr(module, name, lambda nominal, e, number, of, logs, told=told: told)
+    told = [rival if name == teller else found for name in ("begins", "what carries on")]
+    monkeypatch.setattr(
+        module, "_told_by", lambda nominal, e, number, of, logs: iter(told if of is rival else [found])
+    )
     monkeypatch.setattr(module, "begun_as", lambda e, of, logs: logs if of is rival else of)
     assert module._told_by_another(search, (explanation,), session) == ((explanation,), session)
     assert again == [rival] * asked

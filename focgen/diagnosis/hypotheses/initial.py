@@ -23,7 +23,7 @@ from focgen.rig.carried import raised
 from focgen.rig.effects import Run
 from focgen.rig.engine import Chain, Placed
 from focgen.rig.initial import begun
-from focgen.rig.recalled import begin_after, ended, memory, with_recalled
+from focgen.rig.recalled import begin_after, ended, memory, with_earlier
 from focgen.rig.rig import Rig
 
 _AGAIN = 2  # times that the rig is refitted and the begins told anew
@@ -45,13 +45,7 @@ def begun_session(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...
     has to bring the refitted rig closer. Where logs begin elsewhere than at 0 they are asked for it, too: a
     fractional actuator remembers more than a few steps tell.
     """
-
-    def left(session: Sequence[Experiment]) -> float:
-        return _refitted(rig, session)[1]
-
-    found = with_recalled(rig, _told(rig, logs), left)
-    estimated = any(not begin.known for log in found[1:] for begin in log.begins.values())
-    return with_recalled(rig, found, left, held=True) if estimated else found
+    return with_earlier(rig, _told(rig, logs), lambda found: _refitted(rig, found)[1])
 
 
 def _told(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
