@@ -11,8 +11,9 @@ import os
 import signal
 import subprocess
 import tempfile
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from focgen.scratch import temporary_folder
@@ -21,6 +22,7 @@ _PLACES = ("TMPDIR", "TEMP", "TMP")  # where programs look for the temporary fol
 _LISTS = (  # of folders, in which an empty one stands for the current folder, and a relative one lies in it
     "CPATH", "C_INCLUDE_PATH", "LIBRARY_PATH", "COMPILER_PATH", "LD_LIBRARY_PATH", "LD_RUN_PATH",
 )  # fmt: skip
+_ASKS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 _GRACE = 2.0  # s until all of a group that was ended are gone
 
 
@@ -36,7 +38,7 @@ def ran(
     takes longer than ``seconds``. On that and any other exception, an interrupt also, it has ended with all
     that it began.
     """
-    with temporary_folder() as place:
+    with _held_back() as let_go, temporary_folder() as place:
         given = os.environ if env is None else env
         own = {**_elsewhere(given), **dict.fromkeys(_PLACES, str(place))}
         with subprocess.Popen(
@@ -50,6 +52,7 @@ def ran(
             process_group=0,  # what it begins belongs to it; an interrupt of the terminal is ours to pass on
         ) as begun:
             try:
+                let_go()
                 said = begun.communicate(timeout=seconds)
             except BaseException:
                 _end(begun)
@@ -57,6 +60,36 @@ def ran(
         if begun.returncode and os.strerror(errno.ENOSPC) in said[1]:  # no fault of what it was given
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), tempfile.gettempdir())
         return subprocess.CompletedProcess(list(command), begun.returncode, *said)
+
+
+@contextmanager
+def _held_back() -> Iterator[Callable[[], None]]:
+    """Signals whose handlers may raise wait until the function that is given lets them go.
+
+    A program runs before :class:`subprocess.Popen` returns it: what raises between leaves nobody to end it.
+    """
+    came: list[int] = []
+    kept = {number: signal.getsignal(number) for number in _ASKS} if _takes_signals() else {}
+    kept = {number: handler for number, handler in kept.items() if callable(handler)}
+
+    def let_go() -> None:
+        for number, handler in kept.items():
+            signal.signal(number, handler)
+        kept.clear()
+        while came:
+            signal.raise_signal(came.pop())
+
+    for number in kept:
+        signal.signal(number, lambda number, _: came.append(number))
+    try:
+        yield let_go
+    finally:
+        let_go()
+
+
+def _takes_signals() -> bool:
+    """Handlers run in the main thread alone."""
+    return threading.current_thread() is threading.main_thread()
 
 
 def _elsewhere(given: Mapping[str, str]) -> dict[str, str]:

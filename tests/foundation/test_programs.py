@@ -25,7 +25,7 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "killpg"), reason="the system ha
 
 # As the driver of a compiler does: a file of its own in the temporary folder, and a further program.
 # The times are of this worker alone: another may run these tests at the same time, and ends what it finds.
-LIMITED, KILLED = f"7117.{os.getpid()}", f"7227.{os.getpid()}"
+LIMITED, KILLED, EARLY = (f"{number}.{os.getpid()}" for number in (7117, 7227, 7447))
 DRIVER = "#!/bin/sh\necho text > $TMPDIR/ccBETWEEN.s\nsleep {secs} &\ntouch {mark}\nwait\n"
 
 
@@ -77,6 +77,30 @@ def test_a_limit_of_time_ends_all_that_it_began(place, tmp_path):
         programs.ran([str(driver(tmp_path, LIMITED))], seconds=1.0)
     assert (tmp_path / "begun").exists(), "it had not begun"
     assert ended(f"sleep {LIMITED}") and not list(place.iterdir())
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_as_a_program_begins_ends_it(place, monkeypatch, number):
+    """It runs before Popen returns: an interrupt between left nobody who knew of it."""
+
+    class Interrupted(subprocess.Popen):
+        def __init__(self, *args, **kwargs):
+            super().__init__(*args, **kwargs)
+            signal.raise_signal(number)
+
+    def leave(number, _):
+        raise KeyboardInterrupt
+
+    before = signal.signal(number, leave)
+    monkeypatch.setattr(subprocess, "Popen", Interrupted)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            programs.ran(["sleep", EARLY])
+        assert signal.getsignal(number) is leave
+    finally:
+        signal.signal(number, before)
+    monkeypatch.undo()
+    assert ended(f"sleep {EARLY}") and not list(place.iterdir())
 
 
 @pytest.fixture
