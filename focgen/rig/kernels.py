@@ -24,6 +24,7 @@ from focgen.scratch import temporary_folder
 BALANCED = 2
 _AT_ONCE = 1024  # samples that a compiled loop looks at many times: AT_ONCE in ``kernels.c``
 _REGISTERS = 3  # a filter of order 2 is the quickest: one of order 1 is run as such
+_TABLES = 50  # of a plant: of 48 dampers, of its own, and of what is another as it falls
 _SOURCES = [
     Path(__file__).with_name(f"{name}.c") for name in ("kernels", "bending", "plant", "pace", "lever", "weak")
 ]
@@ -199,17 +200,17 @@ def plant(
     x: Array,
     rest: Bytes,
     course: tuple[Array, ...],
-    levels: tuple[int, int, int],
+    levels: tuple[int, int, int, int],
     numbers: Array,
-    tables: Array,
 ) -> Array:
     """A plant with dry friction and a hysteretic spring; what the arguments are is said in ``plant.c``.
 
-    ``course``: ``line``, ``bend`` and ``twist`` (n,); ``levels``: the order, and the levels ``base`` and
-    ``last``.
+    ``course``: ``line``, ``bend`` and ``twist`` (n,); ``levels``: the order, and the levels ``base``,
+    ``fine`` and ``last``.
     """
-    *parts, own, steps = _doubles(*course, numbers, tables)
-    return _call("focgen_plant", x, rest, *parts, *levels, own, steps)
+    _, base, _, last = levels
+    *parts, own, room = _doubles(*course, numbers, np.empty(_TABLES * 12 * (last - base + 1)))
+    return _call("focgen_plant", x, rest, *parts, *levels, own, room)
 
 
 def bent_modes(

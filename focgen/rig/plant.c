@@ -6,35 +6,47 @@
  * where p > 0 and -`unloading` where it is not (Bouc and Wen). Beside it the spring may bend, and an obstacle push, as in bent.h: w
  * holds that, too. A `preload` presses a plant of second order against a seat at y = 0, which catches what comes back to it: there
  * nothing moves until more than the preload pushes, and on either side that much is lost. A damper may be `falling` as strong as the
- * plant falls back to 0, where it is of second order: it has tables of its own, behind the others.
+ * plant falls back to 0, where it is of second order: it has tables of its own.
  *
- * Between events the equation is linear, and a step is exact for an input that is a cubic: `tables` hold, for steps of h/2^level from
+ * Between events the equation is linear, and a step is exact for an input that is a cubic: tables hold, for steps of h/2^level from
  * `level` = base on, what the state and the four coefficients of the input count. w is a cubic through its values and slopes at the
- * ends of a step of level base. Where the velocity changes sign or the friction gives way, steps are halved down to `last`, and what
- * is left there is run along a line, or, where nothing holds what moves, in a step like any other.
+ * ends of a step. Where friction rises with the speed, the tables are those of a damper about as strong as it is at that speed, and what
+ * is left of it is a cubic, too. Where that changes much within a step, steps are halved, down to `fine`. Where the velocity
+ * changes sign or the friction gives way, they are halved down to `last`, and what is left there is run along a line, or, where nothing
+ * holds what moves, in a step like any other.
  */
 #include <math.h>
+#include <string.h>
 #include "bent.h"
 #include "kernels.h"
 
-enum { DIPS = 3 };
+enum { DIPS = 3, TERMS = 9, COUNTS = 12 }; /* TERMS: of the exponential series; COUNTS: numbers that a table has of a step */
+enum { DAMPERS = 48, PLAIN = DAMPERS, FALLING }; /* tables: of dampers that stand for friction, the plant's own, those as it falls */
 static const double NEAR = 0.1, BESIDE = 0.03; /* how far Taylor series go: of q, as a part of it; of powers and exponentials */
 static const double SAME = 0.01;    /* part of its steepness by which q's differs along a displacement that is as good as another */
 static const double FEW = 0.1;      /* part of its steepness that q loses where it is taken from the way since 0 */
+static const double APART = 0.1;    /* of `speed` from one damper that stands for friction to the next */
+static const double LEAP = 0.5;     /* of `speed`: what a step may change the velocity by, about 0 */
+static const double TINY = 0.05;    /* what a step has to be below, in the norm of its matrix, for the series to end */
 static const double NOTHING = 40.0; /* speeds at which an exponential is 0 */
 
 typedef struct {
-    int order, base, last;
+    int order, base, fine, last;
     double h, m, c, k, slide, stick, soft, loading, unloading, power, scale, rise, speed;
-    const double *bend, *tables;
+    const double *bend;
     int bends, curved; /* whether the spring bends or meets an obstacle; whether there is a w, or friction that depends on the speed */
-    double preload, falling;
+    double preload, falling, brisk; /* brisk: 1/s, of the longest step beside what rises as steeply as about 0 */
+    int smooth;                     /* whether nothing changes at once as it turns round */
+    char made[DAMPERS];             /* which tables are made, */
+    double *tables;                 /* each of COUNTS numbers for every level: of DAMPERS, PLAIN, FALLING */
 } Plant;
 
 typedef struct {
     double y, v, q, grown; /* grown: |q|^power scale^(1 - power) */
-    double speed, spared;  /* a magnitude of the velocity and exp(-|v|/speed) there */
-    int moving, side;      /* the sign of the velocity, 0: stuck; the side of the seat, 0: on it */
+    double speed, spared;  /* a magnitude of the velocity and exp(-|v|/speed) there, */
+    double leap;           /* and how many times too long the step is that led here */
+    int moving, side;      /* the sign of the velocity, 0: stuck; the side of the seat, 0: on it; */
+    int turned;            /* whether a smooth plant turned round on the step that led here, by more than a `LEAP` */
 } State;
 
 /* Whether it moves towards 0 under a damper that is another there. */
@@ -79,9 +91,9 @@ static double spared(const Plant *p, State *s)
 /* What friction has risen by, against the side `sign`. */
 static double risen(const Plant *p, State *s, int sign) { return p->rise != 0.0 ? sign * p->rise * (1.0 - spared(p, s)) : 0.0; }
 
-/* What w and what friction has risen by take from the input `u` where it moves to the side `sign`, and in `rate` their rate, times
- * `span`. */
-static double yielded(const Plant *p, State *s, int sign, double u, double span, double *rate)
+/* What w and what friction has risen by take from the input `u` where it moves to the side `sign`, beside a damper of `lent` more that
+ * stands for a part of that, and in `rate` their rate, times `span`. */
+static double yielded(const Plant *p, State *s, int sign, double u, double span, double lent, double *rate)
 {
     double slope = 0.0, held = p->bends ? pull(p->bend, s->y, &slope) : 0.0, gained = 0.0;
     if (p->soft != 0.0) {
@@ -90,8 +102,11 @@ static double yielded(const Plant *p, State *s, int sign, double u, double span,
     }
     if (p->rise != 0.0) {
         double left = spared(p, s);
+        if (p->smooth) sign = s->v < 0.0 ? -1 : 1;
         held += sign * p->rise * (1.0 - left);
-        gained = (u - p->k * s->y - damper(p, s) * s->v - held - sign * p->slide - s->side * p->preload) / p->m * p->rise / p->speed * left;
+        gained = (u - p->k * s->y - damper(p, s) * s->v - held - sign * p->slide - s->side * p->preload) / p->m;
+        gained *= p->rise / p->speed * left - lent;
+        held -= lent * s->v;
     }
     *rate = span * (s->v * slope + gained);
     return held;
@@ -170,26 +185,106 @@ static void wound(const Plant *p, State *s, const State *was, double move, doubl
     }
 }
 
-/* The state after a step of `level` with the input `d` (4 coefficients over the step), friction at `sign` times `slide`. */
-static State stepped(const Plant *p, State s, const double *d, int level, int sign)
+/* The table of a step twice as long. */
+static void doubled(double *t)
 {
-    const double *t = p->tables + 12 * (level - p->base + (falls(p, &s) ? p->last - p->base + 1 : 0));
-    double borne = sign * p->slide + s.side * p->preload;
+    double a = t[0], b = t[1], c = t[2], d = t[3], f[8];
+    memcpy(f, t + 4, sizeof f);
+    for (int row = 0; row < 2; row++) {
+        const double *g = f + 4 * row, *kept = t + 2 * row;
+        double first[4], *to = t + 4 + 4 * row;
+        for (int i = 0; i < 4; i++) first[i] = (kept[0] * f[i] + kept[1] * f[4 + i]) / (double)(1 << i);
+        to[0] = first[0] + g[0];
+        to[1] = first[1] + 0.5 * (g[0] + g[1]);
+        to[2] = first[2] + 0.25 * (g[0] + g[2]) + 0.5 * g[1];
+        to[3] = first[3] + 0.125 * (g[0] + g[3]) + 0.375 * (g[1] + g[2]);
+    }
+    t[0] = a * a + b * c, t[1] = b * (a + d), t[2] = c * (a + d), t[3] = d * d + b * c;
+}
+
+/* The table of a short step of the state's matrix `a` and of what a force counts, by the series of the exponential: powers of the matrix
+ * for what was, and for an input t^i over the step the sum of A^j b i!/(i + j + 1)! step^(j + 1). */
+static void series(const double *a, const double *force, double step, double *t)
+{
+    double power[4] = {1.0, 0.0, 0.0, 1.0}, count[4] = {1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0}, part = 1.0;
+    memset(t, 0, COUNTS * sizeof *t);
+    t[0] = t[3] = 1.0;
+    for (int j = 0; j < TERMS; j++) {
+        part /= j + 1.0;
+        for (int row = 0; row < 2; row++) {
+            double x = power[2 * row], y = power[2 * row + 1], driven = (x * force[0] + y * force[1]) * step;
+            for (int i = 0; i < 4; i++) t[4 + 4 * row + i] += driven * count[i];
+            power[2 * row] = (x * a[0] + y * a[2]) * step, power[2 * row + 1] = (x * a[1] + y * a[3]) * step;
+        }
+        for (int i = 0; i < 4; i++) count[i] /= i + j + 2.0, t[i] += power[i] * part;
+    }
+}
+
+/* The tables of a damper, a step of h/2^base first. */
+static void tabulate(const Plant *p, double damper, double *to)
+{
+    double a[4] = {0.0, 1.0, -p->k / p->m, -damper / p->m}, force[2] = {0.0, 1.0 / p->m}, step = p->h, t[COUNTS];
+    int level = p->last;
+    if (p->order == 1) a[0] = a[2], a[1] = a[2] = a[3] = 0.0, force[0] = force[1], force[1] = 0.0;
+    step /= (double)(1L << level);
+    for (; (fabs(a[0]) + fabs(a[1]) + fabs(a[2]) + fabs(a[3])) * step > TINY; level++) step *= 0.5;
+    for (series(a, force, step, t); level >= p->base; level--, doubled(t))
+        if (level <= p->last) memcpy(to + COUNTS * (level - p->base), t, sizeof t);
+}
+
+/* The tables by which the plant moves: where friction rises with the speed, those of the damper that stands for it. */
+static int pick(const Plant *p, const State *s)
+{
+    if (falls(p, s)) return FALLING;
+    double far = p->rise != 0.0 ? fabs(s->v) / p->speed / APART + 0.5 : PLAIN;
+    return far < DAMPERS ? (int)far : PLAIN;
+}
+
+/* What such a damper has more than the plant's own. */
+static double lent_by(const Plant *p, int set) { return set < DAMPERS ? p->rise / p->speed * exp(-APART * set) : 0.0; }
+
+static const double *table(Plant *p, int set, int level)
+{
+    double *t = p->tables + COUNTS * (p->last - p->base + 1) * set;
+    if (set < DAMPERS && !p->made[set]) {
+        tabulate(p, p->c + lent_by(p, set), t);
+        p->made[set] = 1;
+    }
+    return t + COUNTS * (level - p->base);
+}
+
+/* How many times too long a step of `level` from `s` to `to` is for friction that rises, beside a damper of `lent` more. */
+static double leap(const Plant *p, const State *s, State *to, int level, double lent)
+{
+    double left = spared(p, to), same = lent * p->speed / p->rise;
+    double off = fmax(fabs(left - same), fabs(s->spared - same)) * p->h * p->brisk / (double)(1 << level);
+    return fmax(off, fabs(to->v - s->v) * sqrt(sqrt(fmax(left, s->spared))) / (LEAP * p->speed));
+}
+
+/* The state after a step of `level` with the input `d` (4 coefficients over the step), friction at `sign` times `slide`. */
+static State stepped(Plant *p, State s, const double *d, int level, int sign)
+{
+    int set = pick(p, &s);
+    const double *t = table(p, set, level);
+    double borne = sign * p->slide + s.side * p->preload, lent = lent_by(p, set);
     double span = p->h / (double)(1 << level), f[4] = {d[0] - borne, d[1], d[2], d[3]};
     double at_end = d[0] + d[1] + d[2] + d[3] - borne, slope = 0.0;
-    double before = p->curved ? yielded(p, &s, sign, d[0], span, &slope) : 0.0;
+    double before = p->curved ? yielded(p, &s, sign, d[0], span, lent, &slope) : 0.0;
     double then = before + slope, steep = slope;
     double moved = 0.0;
     State to = s;
+    to.leap = 0.0, to.turned = 0;
     for (int round = 0; round < (p->curved ? 2 : 1); round++) {
         double g[4] = {f[0] - before, f[1] - slope, f[2] - 3.0 * (then - before) + 2.0 * slope + steep,
                        f[3] - slope - steep + 2.0 * (then - before)};
         to.y = t[0] * s.y + t[1] * s.v + t[4] * g[0] + t[5] * g[1] + t[6] * g[2] + t[7] * g[3];
         if (p->order == 2) to.v = t[2] * s.y + t[3] * s.v + t[8] * g[0] + t[9] * g[1] + t[10] * g[2] + t[11] * g[3];
         if (!p->curved) break;
+        if (p->smooth && sign * to.v < 0.0 && fabs(to.v - s.v) > LEAP * p->speed) to.turned = 1;
+        if (p->rise != 0.0) to.leap = fmax(to.leap, leap(p, &s, &to, level, lent));
         if (round == 0) wind(p, &to, moved = to.y - s.y);
         else wound(p, &to, &s, to.y - s.y, moved);
-        then = yielded(p, &to, sign, at_end + borne, span, &steep);
+        then = yielded(p, &to, sign, at_end + borne, span, lent, &steep);
     }
     if (p->order == 1) to.v = (at_end - p->k * to.y - taken(p, &to)) / p->m;
     return to;
@@ -252,7 +347,7 @@ static void cut(const double *c, double at, double part, double *d)
 }
 
 /* One sample under the input c[0] + c[1] t + c[2] t^2 + c[3] t^3, t = 0 ... 1. */
-static void sample(const Plant *p, State *s, const double *c)
+static void sample(Plant *p, State *s, const double *c)
 {
     long whole = 1L << p->last, at = 0;
     int level = p->base;
@@ -260,13 +355,15 @@ static void sample(const Plant *p, State *s, const double *c)
         double d[4];
         cut(c, (double)at / whole, 1.0 / (double)(1 << level), d);
         decide(p, s, d[0]);
+        if (p->smooth && !s->moving) s->moving = 1;
         double u = d[0] + d[1] + d[2] + d[3], span = p->h / (double)(1 << level);
         State to = s->moving ? stepped(p, *s, d, level, s->moving) : *s;
         double ahead = s->moving ? s->moving * to.v : holds(p, s) - fabs(push(p, s, u));
         if (p->order == 1 && s->moving) ahead = s->moving * push(p, &to, u) - p->slide;
         int seats = p->preload > 0.0 && s->side * to.y < 0.0;
-        int again = ahead < 0.0 || seats || (s->moving && level < p->base + DIPS && dips(p, s, &to, d));
-        if (again && level < p->last) {
+        int turns = p->smooth ? to.turned : ahead < 0.0;
+        int again = turns || seats || (s->moving && !p->smooth && level < p->base + DIPS && dips(p, s, &to, d));
+        if ((again && level < p->last) || (s->moving && to.leap > 1.0 && level < p->fine)) {
             level++;
             continue;
         }
@@ -275,13 +372,13 @@ static void sample(const Plant *p, State *s, const double *c)
             rolled(s, p, -s->y);
             s->v = 0.0, s->moving = s->side = 0;
             started(p, s, d[0] + part * (u - d[0]), u, (1.0 - part) * span);
-        } else if (again && ahead < 0.0 && p->order == 2 && p->stick == 0.0 && (s->moving || p->preload == 0.0)) {
+        } else if (turns && p->order == 2 && p->stick == 0.0 && (s->moving || p->preload == 0.0)) {
             if (!s->moving) {
                 s->moving = push(p, s, u) < 0.0 ? -1 : 1;
                 to = stepped(p, *s, d, level, s->moving);
             }
             *s = to, s->moving = to.v < 0.0 ? -1 : 1; /* nothing holds it: it turns round, or sets out */
-        } else if (again && ahead < 0.0) { /* the event is in this short step: what is left of it, by lines */
+        } else if (turns) { /* the event is in this short step: what is left of it, by lines */
             double was = s->moving ? s->moving * s->v : holds(p, s) - fabs(push(p, s, d[0]));
             if (p->order == 1 && s->moving) was = s->moving * push(p, s, d[0]) - p->slide;
             double part = was > 0.0 ? was / (was - ahead) : 0.0;
@@ -293,16 +390,18 @@ static void sample(const Plant *p, State *s, const double *c)
             started(p, s, d[0] + part * (u - d[0]), u, (1.0 - part) * span);
         } else {
             *s = to;
+            if (p->smooth) s->moving = to.v < 0.0 ? -1 : 1;
         }
         at += whole >> level;
-        while (level > p->base && at % (whole >> (level - 1)) == 0) level--;
+        int as_long = s->moving && s->leap > 0.5; /* twice as long it would be too long */
+        while (level > p->base && !(as_long && level <= p->fine) && at % (whole >> (level - 1)) == 0) level--;
     }
 }
 
 /* The plant at `y`, come there from 0 in one go. */
 static State come(const Plant *p, double y)
 {
-    State s = {0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0, 0};
+    State s = {0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0, 0, 0};
     for (int j = 0; j < 32; j++) wind(p, &s, y / 32.0);
     s.y = y, s.side = (y > 0.0) - (y < 0.0);
     return s;
@@ -324,14 +423,18 @@ static State balanced(const Plant *p, double u)
 }
 
 /* n samples of the input: `line`, `bend` and `twist` are what it changes by in a line in the sample that ends at each, and the
- * coefficients of t (t - 1) and t (t - 1)(2 t - 1) beside it; at the first of an experiment, of the sample ahead of it. */
+ * coefficients of t (t - 1) and t (t - 1)(2 t - 1) beside it; at the first of an experiment, of the sample ahead of it. `tables` is room
+ * for (DAMPERS + 2) tables of last - base + 1 steps. */
 void focgen_plant(int n, const double *x, double *y, const unsigned char *rest, const double *line, const double *bend, const double *twist,
-                  int order, int base, int last, const double *numbers, const double *tables)
+                  int order, int base, int fine, int last, const double *numbers, double *tables)
 {
     const double *a = numbers;
     int bends = a[13] != 0.0 || a[14] != 0.0 || a[17] != 0.0;
-    Plant p = {order, base, last, a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], a[12], a + 13, tables,
-               bends, bends || a[6] != 0.0 || a[11] != 0.0, a[18], a[19]};
+    Plant p = {order, base, fine, last, a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], a[12], a + 13,
+               bends, bends || a[6] != 0.0 || a[11] != 0.0, a[18], a[19], a[20], 0, {0}, tables};
+    p.smooth = p.rise != 0.0 && p.slide == 0.0 && p.stick == 0.0 && p.preload == 0.0 && p.soft == 0.0 && p.falling == p.c;
+    tabulate(&p, p.c, tables + COUNTS * (last - base + 1) * PLAIN);
+    if (p.falling != p.c) tabulate(&p, p.falling, tables + COUNTS * (last - base + 1) * FALLING);
     State s = come(&p, 0.0);
     for (int k = 0; k < n; k++) {
         double c[4] = {0.0, 0.0, 0.0, 0.0};

@@ -17,7 +17,6 @@ steps so small that its own error is below 1e-6 of its force.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 
@@ -35,8 +34,6 @@ _SHORT = 0.2  # of a radian of the plant's motion: a step of the hysteretic spri
 _YIELDS = 0.2  # of the time in which friction that rises stops what moves: a step
 _SWING = 1.0  # of a radian: a step without; between two of them the plant is not to turn round twice
 _MOST, _ROUGHLY = 7, 5  # halvings at most of a step before any event, and where a run is rough
-_TERMS = 9  # of the exponential series
-_TINY = 0.05  # what a step has to be below, in the norm of its matrix, for the series to end there
 
 
 @dataclass(frozen=True)
@@ -86,19 +83,17 @@ def respond(
     motion, and no step is shorter than a 32nd of a sample before an event.
     """
     plant, dynamics = _whole(plant, dynamics)
-    base, last = _levels(plant, dynamics, h, rough)
-    falling = replace(plant, c=plant.c / dynamics.unloading)
-    tables, spring, bend = _tables(plant, h, base, last), dynamics.spring, dynamics.bend
-    if falling != plant:
-        tables = np.concatenate([tables, _tables(falling, h, base, last)])
+    base, fine, last = _levels(plant, dynamics, h, rough)
+    spring, bend = dynamics.spring, dynamics.bend
     numbers = [h, plant.m, plant.c, plant.k, *dynamics.drag.held, spring.share * plant.k]
     numbers += [spring.loading, spring.unloading, spring.power, spring.scale]
     numbers += [dynamics.rise.size, dynamics.rise.speed]
     numbers += [plant.k * bend.first, plant.k * bend.second, bend.scale]
-    numbers += [dynamics.place, plant.k * dynamics.stiffness, dynamics.preload, falling.c]
+    numbers += [dynamics.place, plant.k * dynamics.stiffness, dynamics.preload, plant.c / dynamics.unloading]
+    numbers += [_brisk(plant, dynamics)]
     x = np.ascontiguousarray(x, float)
-    moves, levels = course(x, rest, between), (plant.order, base, last)
-    return kernels.plant(x, rest, moves, levels, np.array(numbers), tables)
+    moves, levels = course(x, rest, between), (plant.order, base, fine, last)
+    return kernels.plant(x, rest, moves, levels, np.array(numbers))
 
 
 def _whole(plant: Plant, dynamics: Dynamics) -> tuple[Plant, Dynamics]:
@@ -114,17 +109,24 @@ def _whole(plant: Plant, dynamics: Dynamics) -> tuple[Plant, Dynamics]:
     return replace(plant, k=plant.k * both), whole
 
 
-def _levels(plant: Plant, dynamics: Dynamics, h: float, rough: bool = False) -> tuple[int, int]:
-    """How often a sample is halved: for the motion, and at most, for an event."""
+def _levels(plant: Plant, dynamics: Dynamics, h: float, rough: bool = False) -> tuple[int, int, int]:
+    """How often a sample is halved: for the motion, for friction that rises steeply, and at most, for an
+    event."""
     spring, bend = dynamics.spring, dynamics.bend
     steepest = 1.0 + spring.share * max(abs(spring.loading), abs(spring.unloading)) * spring.scale
     steepest += 2.0 * abs(bend.first) + 3.0 * abs(bend.second) + dynamics.stiffness
     pace = _pace(plant, plant.k * steepest)
     short = _SHORT * (1.0 + rough) if dynamics.changed & {"spring", "bend", "stiffness"} else _SWING
     short *= _evenness(spring.power, rough)
-    base = h * max(pace / short, abs(dynamics.rise.size) / dynamics.rise.speed / plant.m / _YIELDS)
-    base = int(np.clip(np.ceil(np.log2(max(base, 1e-9))), 0, _ROUGHLY if rough else _MOST))
-    return base, base + _halvings(plant, dynamics, rough)
+    most = _ROUGHLY if rough else _MOST
+    base = int(np.clip(np.ceil(np.log2(max(h * pace / short, 1e-9))), 0, most))
+    fine = most if dynamics.rise.size else base
+    return base, fine, max(fine, base + _halvings(plant, dynamics, rough))
+
+
+def _brisk(plant: Plant, dynamics: Dynamics) -> float:
+    """Steps in a second about a velocity of 0, where friction rises."""
+    return abs(dynamics.rise.size) / dynamics.rise.speed / plant.m / _YIELDS
 
 
 def _evenness(power: float, rough: bool) -> float:
@@ -148,50 +150,3 @@ def _pace(plant: Plant, stiffness: float) -> float:
         return stiffness / plant.m
     swing = float(np.sqrt(stiffness / plant.m))
     return min(swing, stiffness / plant.c) if plant.c > 0.0 else swing
-
-
-@lru_cache(maxsize=256)
-def _tables(plant: Plant, h: float, base: int, last: int) -> Array:
-    """For steps of h/2^base … h/2^last: what the state (2, 2) and the input's four coefficients (2, 4) count,
-    12 numbers a step."""
-    if plant.order == 2:
-        state = np.array([[0.0, 1.0], [-plant.k / plant.m, -plant.c / plant.m]])
-        force = np.array([0.0, 1.0 / plant.m])
-    else:
-        state, force = np.diag([-plant.k / plant.m, 0.0]), np.array([1.0 / plant.m, 0.0])
-    finer = max(0, int(np.ceil(np.log2(max(np.abs(state).sum() * h / 2.0**last / _TINY, 1e-300)))))
-    kept, driven = _series(state, force, h / 2.0 ** (last + finer))
-    rows = []
-    for level in range(last + finer, base - 1, -1):
-        if level <= last:
-            rows.append(np.r_[kept.ravel(), driven.ravel()])
-        kept, driven = _doubled(kept, driven)
-    return np.concatenate(rows[::-1])
-
-
-def _series(state: Array, force: Array, step: float) -> tuple[Array, Array]:
-    """The state after a short step, by the series of the exponential: powers of the state's matrix for what
-    was, and for an input t^i over the step the sum of A^j b i!/(i + j + 1)! step^(j + 1)."""
-    power, kept, driven = np.eye(2), np.eye(2), np.zeros((2, 4))
-    counts = 1.0 / np.arange(1.0, 5.0)  # i!/(i + 1)!
-    for j in range(_TERMS):
-        driven += np.outer(power @ force * step, counts)
-        counts = counts / (np.arange(4) + j + 2.0)
-        power = power @ state * step
-        kept = kept + power / _factorial(j + 1)
-    return kept, driven
-
-
-def _factorial(n: int) -> float:
-    return float(np.prod(np.arange(1.0, n + 1.0)))
-
-
-_FIRST = np.diag(0.5 ** np.arange(4))  # a cubic's coefficients over the first half of a step,
-_SECOND = np.array(
-    [[1, 0.5, 0.25, 0.125], [0, 0.5, 0.5, 0.375], [0, 0, 0.25, 0.375], [0, 0, 0, 0.125]]
-)  # and
-
-
-def _doubled(kept: Array, driven: Array) -> tuple[Array, Array]:
-    """The same for a step twice as long."""
-    return kept @ kept, kept @ driven @ _FIRST + driven @ _SECOND

@@ -182,6 +182,30 @@ def test_friction_that_rises_with_the_speed_against_an_integrator(rise):
     assert np.max(np.abs(made - respond(plant, x, rest(len(x)), H))) > 0.01 * np.max(np.abs(exact))
 
 
+@pytest.mark.parametrize("rise", [Rise(0.4, 0.5), Rise(0.3, 0.004), Rise(0.1, 0.0015), Rise(-0.02, 0.01)])
+@pytest.mark.parametrize("force", [0.0, 0.05])
+@pytest.mark.parametrize("plant", [Plant(2, 0.05, 3.0, 20.0), Plant(2, 0.002, 0.1, 1.0)])
+def test_steep_friction_on_a_light_plant_against_small_implicit_steps(plant, force, rise):
+    """It stops the plant within 0.01 to 4 ms, which turns round, creeps and, with dry friction, sticks."""
+    count, fine = 120, 1500
+    t = H * np.arange(count)
+    x = 2 * np.sin(3 * t) + 1.2 * np.sin(7.3 * t)
+    # friction at the step's end, by what it is at its begin: v = (push - sign(v) (force + rise)) / (1 + ...)
+    y, v, step, exact = 0.0, 0.0, H / fine, np.zeros(count)
+    for i, u in enumerate(np.interp(H / fine * np.arange(1, (count - 1) * fine + 1), t, x), 1):
+        left = np.exp(-abs(v) / rise.speed)
+        slope = rise.size / rise.speed * left
+        held = force + rise.size * (1.0 - left) - slope * abs(v)
+        weight = plant.m + step * (plant.c + slope) + step * step * plant.k
+        push = plant.m * v + step * (u - plant.k * y)
+        v = np.sign(push) * max(0.0, abs(push) - step * held) / weight
+        y += step * v
+        if i % fine == 0:
+            exact[i // fine] = y
+    made = respond(plant, x, rest(count), H, Dynamics(drag=Friction(force, force), rise=rise))
+    np.testing.assert_allclose(made, exact, atol=2e-4 * np.max(np.abs(exact)))
+
+
 def test_a_spring_in_equilibrium_stays_there():
     plant, spring = Plant(2, 0.5, 0.3, 40.0), Spring(0.6, 4.0, 9.0)
     held = rest(400).copy()
