@@ -32,6 +32,7 @@ _TURNED = 6  # times where nothing holds what turns round: what is left is a ste
 _TURNED_ROUGHLY = 5  # and where a run is rough
 _SHORT = 0.2  # of a radian of the plant's motion: a step of the hysteretic spring
 _YIELDS = 0.2  # of the time in which friction that rises stops what moves: a step
+_FINER = 16.0  # times as short it may be where the velocity changes quickly
 _SWING = 1.0  # of a radian: a step without; between two of them the plant is not to turn round twice
 _MOST, _ROUGHLY = 7, 5  # halvings at most of a step before any event, and where a run is rough
 
@@ -119,9 +120,14 @@ def _levels(plant: Plant, dynamics: Dynamics, h: float, rough: bool = False) -> 
     short = _SHORT * (1.0 + rough) if dynamics.changed & {"spring", "bend", "stiffness"} else _SWING
     short *= _evenness(spring.power, rough)
     most = _ROUGHLY if rough else _MOST
-    base = int(np.clip(np.ceil(np.log2(max(h * pace / short, 1e-9))), 0, most))
-    fine = most if dynamics.rise.size else base
+    base, fine = (_halved(h * paces, most) for paces in (pace / short, _FINER * _brisk(plant, dynamics)))
+    fine = max(base, fine)
     return base, fine, max(fine, base + _halvings(plant, dynamics, rough))
+
+
+def _halved(steps: float, most: int) -> int:
+    """How often a sample is halved for so many steps of it, ``most`` at most."""
+    return int(np.clip(np.ceil(np.log2(max(steps, 1e-9))), 0, most))
 
 
 def _brisk(plant: Plant, dynamics: Dynamics) -> float:
