@@ -154,7 +154,7 @@ def _slow(
             continue
         segment = e.segment.anew(run=run_of(logs, e.segment.entry))
         slow = [n for n, family in library().items() if family.slow and family.stage in segment.stages]
-        left = [_left_alone(search.nominal, segment, logs, name) for name in slow]
+        left = [_left_with(search.nominal, segment, logs, [name]) for name in slow]
         if left and min(left) < NUMBERS.unlikely * e.square:
             step("what is slow, from log to log")
             again = search.better(explanations, logs)
@@ -162,9 +162,9 @@ def _slow(
     return explanations, session
 
 
-def _left_alone(nominal: Rig, segment: Segment, logs: Sequence[Experiment], name: str) -> float:
-    """The mean square that a family leaves by itself."""
-    return explain(nominal, segment, logs, NUMBERS.nats, [name]).square
+def _left_with(nominal: Rig, segment: Segment, logs: Sequence[Experiment], names: Sequence[str]) -> float:
+    """The mean square that these families leave, and no others."""
+    return explain(nominal, segment, logs, NUMBERS.nats, names).square
 
 
 def _told_by_another(
@@ -224,15 +224,31 @@ def _lasting(
 ) -> tuple[tuple[Explanation, ...], tuple[Experiment, ...]]:
     """The findings and the session, made anew where a loop or a play lies, as a log begins, where the one
     before left it. A refit of what remembers, without what it was found beside, shows first whether that is
-    worth a search: a drift makes up for it."""
+    worth a search: a drift makes up for it. So does what remembers beside what was found instead."""
     if len(session) < 2:
         return explanations, session
     lasting = tuple(replace(log, lasts=True) for log in session)
-    if sum(gained(bare, lasting) for e in explanations if (bare := remembering(e))) < NUMBERS.nats:
+    gain = sum(gained(bare, lasting) for e in explanations if (bare := remembering(e)))
+    if gain < NUMBERS.nats and not any(_remembers(search, e, lasting) for e in explanations):
         return explanations, session
     step("what is left where the last log ended")
     again = search.better(explanations, lasting)
     return (again, lasting) if again else (explanations, session)
+
+
+def _remembers(search: _Search, e: Explanation, lasting: Sequence[Experiment]) -> bool:
+    """Whether what was found leaves far more than it does with a family beside it that lies where the log
+    before left it. Where every loop is taken to begin anew, a drift or a curve stands in its place."""
+    wanders = any(candidate.form.wanders for candidate in e.best.problem.candidates)
+    if search.only is not None or not (wanders or e.predictability.share > NUMBERS.left):
+        return False
+    segment = e.segment.anew(run=run_of(lasting, e.segment.entry))
+    others = [n for n, family in library().items() if family.remembers and family.stage in segment.stages]
+    found = list(e.best.problem.families)
+    return any(
+        _left_with(search.nominal, segment, lasting, [*found, name]) < NUMBERS.unlikely * e.square
+        for name in others
+    )
 
 
 def _carried_on(
