@@ -182,6 +182,11 @@ class Dynamics:
         """What of it differs from the nominal equation."""
         return frozenset() if self is UNCHANGED else frozenset(self._changes())
 
+    @property
+    def keeps(self) -> bool:
+        """Whether what moves may rest elsewhere than at 0 once it was moved."""
+        return self.spring != LINEAR or self.drag != NO_FRICTION
+
     def _changes(self) -> Iterator[str]:
         for name, value in vars(self).items():
             usual = getattr(UNCHANGED, name)

@@ -50,9 +50,15 @@ class Placed:
         return self.form.leaves(x, self.values, self._own(run)) if self.form.leaves else {}
 
     def _own(self, run: Run) -> Run:
-        if run.lasts and (family := library().get(self.effect)) and family.remembers:
+        if run.lasts and self.remembers:
             run = run.unbroken
         return replace(run, carried=self.carried) if self.carried else run
+
+    @property
+    def remembers(self) -> bool:
+        """Whether it stays where its last turn left it."""
+        family = library().get(self.effect)
+        return family is not None and family.remembers
 
     @property
     def slot(self) -> str:
@@ -116,11 +122,15 @@ class Chain:
         if run.begins:
             return self._begun(x, first, last, run, between, tap, left)
         begin, end = STAGES.index(first), STAGES.index(last)
+        keeps = {p.stage for p in self.placed if p.remembers and p.slot in EQUATIONS.values()}
+        held = run.held(x) if run.lasts else run
         for stage in STAGES[begin : end + 1]:
             for number, (key, act, placed) in enumerate(self.steps(stage, between)):
                 if left is not None and placed is not None:
                     left[_index(self.placed, placed)] = placed.leaves(x, run)
                 x = self._once((stage, number), key, x, act, run)
+                if stage in keeps if placed is None else placed.remembers:
+                    run = held
             if run.stands and stage == self.rig.integrator:
                 x, run = self._once("stood", run.stands, x, from_there, run), run.stood
             if tap is not None:
@@ -359,7 +369,8 @@ def _heavier(of: TransferFunction, mass: float) -> TransferFunction:
 
 def _plant(plant: plants.Plant, dynamics: Dynamics, between: Between | bool, delay: float) -> Step:
     def act(x: Array, run: Run) -> Array:
-        made = plants.respond(plant, x, run.rest, run.h, dynamics, between, run.rough)
+        kept = run.lasts and dynamics.keeps
+        made = plants.respond(plant, x, run.rest, run.h, dynamics, between, run.rough, kept)
         return delayed(made, run.rest, run.h, delay) if delay else made
 
     return (plant, dynamics, between, delay), act, None

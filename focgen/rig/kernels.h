@@ -30,8 +30,8 @@ int focgen_innovations(int n, const double *y, double *out, const unsigned char 
     double *room);
 void focgen_products(int n, int k, int known, const double *r, double *m);
 void focgen_plant(int n, const double *x, double *y, const unsigned char *rest, const double *line, const
-    double *bend, const double *twist, int order, int base, int fine, int last, const double *numbers, double
-    *tables);
+    double *bend, const double *twist, int order, int base, int fine, int last, int kept, const double *numbers,
+    double *tables);
 void focgen_bent_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a,
     const double *b0, const double *b1, const double *pair, double through, int switching, const double
     *spring, double *z);

@@ -201,6 +201,7 @@ def plant(
     rest: Bytes,
     course: tuple[Array, ...],
     levels: tuple[int, int, int, int],
+    kept: bool,
     numbers: Array,
 ) -> Array:
     """A plant with dry friction and a hysteretic spring; what the arguments are is said in ``plant.c``.
@@ -210,7 +211,7 @@ def plant(
     """
     _, base, _, last = levels
     *parts, own, room = _doubles(*course, numbers, np.empty(_TABLES * 12 * (last - base + 1)))
-    return _call("focgen_plant", x, rest, *parts, *levels, own, room)
+    return _call("focgen_plant", x, rest, *parts, *levels, int(kept), own, room)
 
 
 def bent_modes(

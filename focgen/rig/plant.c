@@ -21,6 +21,7 @@
 #include "kernels.h"
 
 enum { DIPS = 3, TERMS = 9, COUNTS = 12 }; /* TERMS: of the exponential series; COUNTS: numbers that a table has of a step */
+enum { LONG = 4000 }; /* samples at most of a rest */
 enum { DAMPERS = 48, PLAIN = DAMPERS, FALLING }; /* tables: of dampers that stand for friction, the plant's own, those as it falls */
 static const double NEAR = 0.1, BESIDE = 0.03; /* how far Taylor series go: of q, as a part of it; of powers and exponentials */
 static const double SAME = 0.01;    /* part of its steepness by which q's differs along a displacement that is as good as another */
@@ -28,6 +29,7 @@ static const double FEW = 0.1;      /* part of its steepness that q loses where 
 static const double APART = 0.1;    /* of `speed` from one damper that stands for friction to the next */
 static const double LEAP = 0.5;     /* of `speed`: what a step may change the velocity by, about 0 */
 static const double TINY = 0.05;    /* what a step has to be below, in the norm of its matrix, for the series to end */
+static const double STILL = 1e-6;   /* part of the way that a plant at rest may still go in a sample */
 static const double NOTHING = 40.0; /* speeds at which an exponential is 0 */
 
 typedef struct {
@@ -422,11 +424,25 @@ static State balanced(const Plant *p, double u)
     return come(p, side * high);
 }
 
+/* A state that was left is at rest under `u` after so long a rest, to which the input came in one sample from `last`. */
+static void settled(Plant *p, State *s, double last, double u)
+{
+    double c[4] = {last, u - last, 0.0, 0.0}, far = fabs(s->y);
+    for (int k = 0; k < LONG; k++) {
+        double was = s->y;
+        sample(p, s, c);
+        far = fmax(far, fabs(s->y));
+        if (k && (!s->moving || fabs(s->y - was) < STILL * far)) break;
+        c[0] = u, c[1] = 0.0;
+    }
+}
+
 /* n samples of the input: `line`, `bend` and `twist` are what it changes by in a line in the sample that ends at each, and the
  * coefficients of t (t - 1) and t (t - 1)(2 t - 1) beside it; at the first of an experiment, of the sample ahead of it. `tables` is room
- * for (DAMPERS + 2) tables of last - base + 1 steps. */
+ * for (DAMPERS + 2) tables of last - base + 1 steps. Where it is `kept`, later experiments begin where the one before left the plant, after a
+ * rest. */
 void focgen_plant(int n, const double *x, double *y, const unsigned char *rest, const double *line, const double *bend, const double *twist,
-                  int order, int base, int fine, int last, const double *numbers, double *tables)
+                  int order, int base, int fine, int last, int kept, const double *numbers, double *tables)
 {
     const double *a = numbers;
     int bends = a[13] != 0.0 || a[14] != 0.0 || a[17] != 0.0;
@@ -439,7 +455,8 @@ void focgen_plant(int n, const double *x, double *y, const unsigned char *rest, 
     for (int k = 0; k < n; k++) {
         double c[4] = {0.0, 0.0, 0.0, 0.0};
         if (rest[k]) {
-            s = rest[k] == BALANCED ? balanced(&p, x[k]) : come(&p, 0.0);
+            if (kept && k) settled(&p, &s, x[k - 1], rest[k] == BALANCED ? x[k] : 0.0);
+            else s = rest[k] == BALANCED ? balanced(&p, x[k]) : come(&p, 0.0);
             c[1] = line[k];
             if (line[k] != 0.0) sample(&p, &s, c);
         } else {

@@ -73,6 +73,7 @@ def respond(
     dynamics: Dynamics = UNCHANGED,
     between: Between | bool = Between.STRAIGHT,
     rough: bool = False,
+    kept: bool = False,
 ) -> Array:
     """The output (n,) for the input ``x`` (n,) sampled every ``h`` s, at rest wherever ``rest`` (n,) is not
     0; of ``dynamics`` the drag, the springs and, for order 2, the preload and the damper of
@@ -81,7 +82,9 @@ def respond(
     ``between``: what the input does from one sample to the next. In straight lines it comes from 0 within the
     sample ahead of an experiment, as in :func:`~focgen.rig.linear.run`; else it jumps at the first sample.
     ``rough``: steps of a hysteretic or bent spring are twice as long, with an error mostly below 1e-3 of the
-    motion, and no step is shorter than a 32nd of a sample before an event.
+    motion, and no step is shorter than a 32nd of a sample before an event. ``kept``: a later experiment
+    begins where the one before left the plant, after a rest under 0, or under its first input where that is
+    in equilibrium.
     """
     plant, dynamics = _whole(plant, dynamics)
     base, fine, last = _levels(plant, dynamics, h, rough)
@@ -94,7 +97,7 @@ def respond(
     numbers += [_brisk(plant, dynamics)]
     x = np.ascontiguousarray(x, float)
     moves, levels = course(x, rest, between), (plant.order, base, fine, last)
-    return kernels.plant(x, rest, moves, levels, np.array(numbers))
+    return kernels.plant(x, rest, moves, levels, kept and plant.k > 0.0, np.array(numbers))
 
 
 def _whole(plant: Plant, dynamics: Dynamics) -> tuple[Plant, Dynamics]:

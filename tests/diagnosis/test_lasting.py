@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 from focgen.diagnosis.diagnose import diagnose
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
-from focgen.rig.effects import Run, form_of
+from focgen.rig.effects import Run, form_of, library
 from focgen.rig.engine import Chain, Placed
 from focgen.rig.replay import simulate_session
 from focgen.rig.rig import LinearActuator, Rig, Signals
@@ -79,7 +79,7 @@ def test_a_loop_left_by_the_last_log_is_that_and_no_more(where, effect, size):
 
 
 def test_what_remembers_alone_lies_where_the_last_experiment_left_it():
-    """As one long run, whose rests are left out; a lag begins at 0 all the same."""
+    """As one long run, whose rests are left out; a lag ahead of it begins at 0 all the same."""
     x = np.r_[np.linspace(0.0, 1.0, 50), np.linspace(1.0, 0.0, 50)]
     play, late = form_of("hysteresis", "play"), form_of("slow_regulator", "one_lag")
     run = Run.of([100, 100], [0.0, 10.0], H, lasts=True)
@@ -90,6 +90,71 @@ def test_what_remembers_alone_lies_where_the_last_experiment_left_it():
         anew = placed.act(np.r_[x, x], Run.of([100, 100], [0.0, 10.0], H))
         np.testing.assert_array_equal(made, whole if kept else anew)
         assert np.max(np.abs(whole - anew)) > 0.01
+
+
+HEAVY = TransferFunction([(2.0, 0.0)], [(0.02, 2.0), (0.3, 1.0), (1.0, 0.0)])
+
+
+@pytest.mark.parametrize(
+    "effect, form, values, dynamics",
+    [
+        ("hysteresis", "play", (0.05,), LAG),  # ahead of the lag, which rests where that holds it
+        ("hysteresis", "added_spring", (0.3, 4.0, 4.0, 1.0), HEAVY),
+        ("friction", "coulomb", (0.1,), HEAVY),
+        ("friction", "rising", (0.1, 0.05, 0.02), HEAVY),
+        ("sensor_hysteresis", "play", (0.05,), LAG),
+    ],
+)
+def test_a_later_log_goes_on_where_a_long_rest_has_led(effect, form, values, dynamics):
+    """As the same rig does in one run, with its rest of 30 s. All that lay behind a loop began at 0."""
+    t = H * np.arange(300)
+    up = np.interp(t, [0.0, 0.4, 2.0, 3.5, 4.5], [0.0, 0.0, 1.0, 0.3, 0.6])
+    again = np.interp(t, [0.0, 0.4, 2.0, 6.0], [0.0, 0.0, 0.5, 0.1])
+    pause = np.zeros(1500)
+    chain = Chain(
+        replace(RIG, actuator=LinearActuator(dynamics)),
+        (Placed(effect, form_of(effect, form), library()[effect].stage, values),),
+    )
+    whole = chain.run(np.r_[up, pause, again], "regulator", "sensor", Run.of([2100], [0.0], H))
+    made = chain.run(np.r_[up, again], "regulator", "sensor", Run.of([300, 300], [0.0, 36.0], H, lasts=True))
+    anew = chain.run(np.r_[up, again], "regulator", "sensor", Run.of([300, 300], [0.0, 36.0], H))
+    span = np.ptp(whole)
+    assert abs(whole[1800]) > 0.01 * span, "it rests elsewhere than at 0"
+    np.testing.assert_allclose(made, np.r_[whole[:300], whole[1800:]], atol=2e-3 * span)
+    assert np.max(np.abs(anew[300:] - whole[1800:])) > 0.01 * span
+
+
+def test_a_log_whose_input_does_not_begin_at_0_begins_at_rest():
+    """Nobody knows what it was before."""
+    x = np.r_[np.zeros(50), np.ones(50), np.full(100, 0.7)]
+    run = Run.of([100, 100], [0.0, 10.0], H, lasts=True)
+    assert run.held(x) is not run and run.held(x).rest[100] == 1
+    x[100:] = 0.004
+    assert run.held(x).rest[100] == 2
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed, size, delay", [(1, 0.25, 0.6), (2, 0.15, 0.3)])
+def test_a_loop_behind_a_dead_time_is_that(seed, size, delay):
+    """One was `unknown`, with a wander in the place of its loop, and one a slow sensor."""
+    rng, late = np.random.default_rng(seed), round(delay / H)
+    parts = []
+    for _ in range(3):
+        u = np.repeat(rng.uniform(0.0, 1.0, N // 100), 100)
+        u[:60] = u[-100:] = 0.0
+        parts += [u, np.zeros(REST)]
+    u = np.concatenate(parts)
+    p = lagged(np.r_[np.zeros(late), u[:-late]], 0.2)
+    y = lagged(0.4 * p + 0.6 * loops(p, size), 0.8, 2.0)
+    y = y + 0.01 * rng.standard_normal(len(y))
+    logs = [
+        Experiment(f"{k}", H, {"command": u[s], "output": y[s]}, start=k * 32.0)
+        for k, s in enumerate(slice(a, a + N) for a in range(0, 3 * (N + REST), N + REST))
+    ]
+    found = diagnose(replace(RIG, signals=Signals("t", "y", "u")), logs, pictures=False)
+    names = {cause.candidates[0].effect for cause in found.causes}
+    assert names == {"hysteresis", "transport_delay"}
+    assert found.gap.explained < 0.012
 
 
 def test_a_session_is_simulated_as_its_experiments_say():

@@ -71,6 +71,9 @@ PLACE = "place"
 """The name of a parameter that says where something lay when an experiment began elsewhere than at rest."""
 
 
+_STILL = 0.01  # of its largest value: an input that is 0 but for noise
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
     """A session being simulated, its experiments one after the other in every array of shape (n,).
@@ -101,6 +104,14 @@ class Run:
         later = np.flatnonzero(rest)[1:]
         rest[later[rest[later] == 1]] = 0
         return replace(self, rest=rest)
+
+    def held(self, x: Array) -> Run:
+        """The run behind what remembers, whose input is ``x`` (n,): a later experiment that begins with an
+        input of 0 begins in equilibrium with what that makes of it."""
+        rest, still = self.rest.copy(), _STILL * float(np.max(np.abs(x), initial=0.0))
+        later = np.flatnonzero(rest)[1:]
+        rest[later[(rest[later] == 1) & (np.abs(x[later]) <= still)]] = 2
+        return self if self.stands else replace(self, rest=rest)
 
     @cached_property
     def stood(self) -> Run:
