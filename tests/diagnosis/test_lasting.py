@@ -39,26 +39,33 @@ def loops(x, size):
     return found.mean(axis=0)
 
 
-def session(seed, where, size):
-    """Three logs of random holds that begin and end at 0, with rests between them that nobody logged."""
-    rng = np.random.default_rng(seed)
+def held(rng):
+    """Three commands of random holds that begin and end at 0, in a row with the rests between them."""
     parts = []
     for _ in range(3):
         u = np.repeat(rng.uniform(0.0, 1.0, N // 100), 100)
         u[:60] = u[-100:] = 0.0
         parts += [u, np.zeros(REST)]
-    u = np.concatenate(parts)
+    return np.concatenate(parts)
+
+
+def logged(**signals):
+    """The three logs of such a row: nobody logged the rests."""
+    return [
+        Experiment(f"{k}", H, {role: x[a : a + N] for role, x in signals.items()}, start=k * 32.0)
+        for k, a in enumerate(range(0, 3 * (N + REST), N + REST))
+    ]
+
+
+def session(seed, where, size):
+    """Such logs of a rig whose actuator or sensor has loops."""
+    rng = np.random.default_rng(seed)
+    u = held(rng)
     p = lagged(u, 0.2)
     y = lagged(0.4 * p + 0.6 * loops(p, size) if where == "actuator" else p, 0.8, 2.0)
     y = 0.4 * y + 1.2 * loops(y / 2.0, size) if where == "sensor" else y
-    noisy = {
-        "pressure": p + 0.003 * rng.standard_normal(len(p)),
-        "output": y + 0.008 * rng.standard_normal(len(y)),
-    }
-    return [
-        Experiment(f"{k}", H, {"command": u[s], **{role: x[s] for role, x in noisy.items()}}, start=k * 32.0)
-        for k, s in enumerate(slice(a, a + N) for a in range(0, 3 * (N + REST), N + REST))
-    ]
+    noisy = p + 0.003 * rng.standard_normal(len(p))
+    return logged(command=u, pressure=noisy, output=y + 0.008 * rng.standard_normal(len(y)))
 
 
 @pytest.mark.long
@@ -138,19 +145,10 @@ def test_a_log_whose_input_does_not_begin_at_0_begins_at_rest():
 def test_a_loop_behind_a_dead_time_is_that(seed, size, delay):
     """One was `unknown`, with a wander in the place of its loop, and one a slow sensor."""
     rng, late = np.random.default_rng(seed), round(delay / H)
-    parts = []
-    for _ in range(3):
-        u = np.repeat(rng.uniform(0.0, 1.0, N // 100), 100)
-        u[:60] = u[-100:] = 0.0
-        parts += [u, np.zeros(REST)]
-    u = np.concatenate(parts)
+    u = held(rng)
     p = lagged(np.r_[np.zeros(late), u[:-late]], 0.2)
     y = lagged(0.4 * p + 0.6 * loops(p, size), 0.8, 2.0)
-    y = y + 0.01 * rng.standard_normal(len(y))
-    logs = [
-        Experiment(f"{k}", H, {"command": u[s], "output": y[s]}, start=k * 32.0)
-        for k, s in enumerate(slice(a, a + N) for a in range(0, 3 * (N + REST), N + REST))
-    ]
+    logs = logged(command=u, output=y + 0.01 * rng.standard_normal(len(y)))
     found = diagnose(replace(RIG, signals=Signals("t", "y", "u")), logs, pictures=False)
     names = {cause.candidates[0].effect for cause in found.causes}
     assert names == {"hysteresis", "transport_delay"}
