@@ -123,16 +123,19 @@ class Chain:
             return self._begun(x, first, last, run, between, tap, left)
         begin, end = STAGES.index(first), STAGES.index(last)
         keeps = {p.stage for p in self.placed if p.remembers and p.slot in EQUATIONS.values()}
-        held = run.held(x) if run.lasts else run
+        before, behind = run, run.held(x) if run.lasts else run
         for stage in STAGES[begin : end + 1]:
             for number, (key, act, placed) in enumerate(self.steps(stage, between)):
+                remembers = placed is not None and placed.remembers
+                own = before if remembers else run
                 if left is not None and placed is not None:
-                    left[_index(self.placed, placed)] = placed.leaves(x, run)
-                x = self._once((stage, number), key, x, act, run)
-                if stage in keeps if placed is None else placed.remembers:
-                    run = held
+                    left[_index(self.placed, placed)] = placed.leaves(x, own)
+                x = self._once((stage, number), key, x, act, own)
+                if remembers or (placed is None and stage in keeps):
+                    run = behind
             if run.stands and stage == self.rig.integrator:
                 x, run = self._once("stood", run.stands, x, from_there, run), run.stood
+                before = behind = run
             if tap is not None:
                 tap[stage] = x
             if between != Between.STRAIGHT and not self._passes(stage):

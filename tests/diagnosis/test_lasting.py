@@ -102,29 +102,35 @@ def test_what_remembers_alone_lies_where_the_last_experiment_left_it():
 HEAVY = TransferFunction([(2.0, 0.0)], [(0.02, 2.0), (0.3, 1.0), (1.0, 0.0)])
 
 
+AHEAD = "hysteresis", "play", (0.05,)  # of the lag, which rests where that holds it
+OF_THE_SENSOR = "sensor_hysteresis", "play", (0.05,)
+
+
 @pytest.mark.parametrize(
-    "effect, form, values, dynamics",
+    "effects, dynamics",
     [
-        ("hysteresis", "play", (0.05,), LAG),  # ahead of the lag, which rests where that holds it
-        ("hysteresis", "added_spring", (0.3, 4.0, 4.0, 1.0), HEAVY),
-        ("friction", "coulomb", (0.1,), HEAVY),
-        ("friction", "rising", (0.1, 0.05, 0.02), HEAVY),
-        ("sensor_hysteresis", "play", (0.05,), LAG),
+        ([AHEAD], LAG),
+        ([OF_THE_SENSOR], LAG),
+        ([AHEAD, OF_THE_SENSOR], LAG),
+        ([("hysteresis", "added_spring", (0.3, 4.0, 4.0, 1.0))], HEAVY),
+        ([("friction", "coulomb", (0.1,))], HEAVY),
+        ([("friction", "rising", (0.1, 0.05, 0.02)), OF_THE_SENSOR], HEAVY),
     ],
 )
-def test_a_later_log_goes_on_where_a_long_rest_has_led(effect, form, values, dynamics):
+def test_a_later_log_goes_on_where_a_long_rest_has_led(effects, dynamics):
     """As the same rig does in one run, with its rest of 30 s. All that lay behind a loop began at 0."""
     t = H * np.arange(300)
     up = np.interp(t, [0.0, 0.4, 2.0, 3.5, 4.5], [0.0, 0.0, 1.0, 0.3, 0.6])
     again = np.interp(t, [0.0, 0.4, 2.0, 6.0], [0.0, 0.0, 0.5, 0.1])
     pause = np.zeros(1500)
-    chain = Chain(
-        replace(RIG, actuator=LinearActuator(dynamics)),
-        (Placed(effect, form_of(effect, form), library()[effect].stage, values),),
-    )
-    whole = chain.run(np.r_[up, pause, again], "regulator", "sensor", Run.of([2100], [0.0], H))
-    made = chain.run(np.r_[up, again], "regulator", "sensor", Run.of([300, 300], [0.0, 36.0], H, lasts=True))
-    anew = chain.run(np.r_[up, again], "regulator", "sensor", Run.of([300, 300], [0.0, 36.0], H))
+    placed = (Placed(name, form_of(name, form), library()[name].stage, v) for name, form, v in effects)
+    chain = Chain(replace(RIG, actuator=LinearActuator(dynamics)), tuple(placed))
+
+    def run(x, *own, **how):
+        return chain.run(x, "regulator", "sensor", Run.of(*own, H, **how))
+
+    whole = run(np.r_[up, pause, again], [2100], [0.0])
+    made, anew = (run(np.r_[up, again], [300, 300], [0.0, 36.0], lasts=lasts) for lasts in (True, False))
     span = np.ptp(whole)
     assert abs(whole[1800]) > 0.01 * span, "it rests elsewhere than at 0"
     np.testing.assert_allclose(made, np.r_[whole[:300], whole[1800:]], atol=2e-3 * span)
