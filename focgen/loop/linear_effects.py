@@ -12,7 +12,7 @@ import numpy as np
 
 from focgen.arrays import Array, Complex
 from focgen.present import present
-from focgen.rig.engine import Placed
+from focgen.rig.placed import Placed
 from focgen.rig.replay import placed_in
 from focgen.rig.rig import Rig
 

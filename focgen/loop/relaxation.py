@@ -23,7 +23,8 @@ from focgen.loop.chain import substeps
 from focgen.loop.run import LoopRun
 from focgen.loop.stepper import Stepper
 from focgen.rig.effects import Run
-from focgen.rig.engine import Chain, Placed
+from focgen.rig.engine import Chain
+from focgen.rig.placed import Placed
 from focgen.rig.replay import placed_in, session_end
 from focgen.rig.rig import Rig
 from focgen.rig.stages import LEAVES

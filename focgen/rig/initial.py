@@ -24,8 +24,9 @@ from focgen.logs.between import white_level
 from focgen.logs.experiment import Experiment
 from focgen.rig.carried import FIRST, carried, raised, stretched
 from focgen.rig.effects import Run, library
-from focgen.rig.engine import Chain, Placed, between_of
+from focgen.rig.engine import Chain, between_of
 from focgen.rig.magnitudes import Magnitudes
+from focgen.rig.placed import Placed
 from focgen.rig.rig import UNITY, LinearActuator, Rig
 from focgen.rig.stages import ENTERS, STAGES
 from focgen.rig.stood import standing

@@ -21,8 +21,9 @@ import numpy as np
 from focgen.arrays import Array, Bools
 from focgen.logs.begin import Begin
 from focgen.logs.experiment import Experiment
-from focgen.rig.engine import Chain, Placed, between_of
+from focgen.rig.engine import Chain, between_of
 from focgen.rig.initial import NOTE as ESTIMATED
+from focgen.rig.placed import Placed
 from focgen.rig.response import integrations, longest, response_time
 from focgen.rig.rig import Rig
 from focgen.rig.session import joined, run_of

@@ -21,8 +21,9 @@ from focgen.logs.still import check_moving
 from focgen.logs.table import LARGEST
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.effects import Parameter, library
-from focgen.rig.engine import Chain, Placed, between_of
+from focgen.rig.engine import Chain, between_of
 from focgen.rig.initial import begun, in_windows
+from focgen.rig.placed import Placed
 from focgen.rig.plausibility import doubts
 from focgen.rig.recalled import with_earlier
 from focgen.rig.response import check_bounded, longest

@@ -16,7 +16,8 @@ from focgen.logs.begin import Begin
 from focgen.logs.between import white_level
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import Run
-from focgen.rig.engine import Chain, Placed, between_of
+from focgen.rig.engine import Chain, between_of
+from focgen.rig.placed import Placed
 from focgen.rig.rig import Actuator, LinearActuator, Rig
 from focgen.rig.stages import ENTERS, LEAVES, STAGES
 

@@ -15,8 +15,9 @@ from focgen.logs.begin import Begin
 from focgen.logs.experiment import Experiment
 from focgen.logs.read import in_session_order
 from focgen.rig.effects import Run, form_of
-from focgen.rig.engine import Chain, Placed
+from focgen.rig.engine import Chain
 from focgen.rig.initial import NOTE
+from focgen.rig.placed import Placed
 from focgen.rig.rig import Actuator, Rig, Signals
 from tests.diagnosis_rig import RIG, H, session
 

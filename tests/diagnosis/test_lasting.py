@@ -14,7 +14,8 @@ from focgen.diagnosis.diagnose import diagnose
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import Run, form_of, library
-from focgen.rig.engine import Chain, Placed
+from focgen.rig.engine import Chain
+from focgen.rig.placed import Placed
 from focgen.rig.replay import simulate_session
 from focgen.rig.rig import LinearActuator, Rig, Signals
 

@@ -16,7 +16,7 @@ from focgen.diagnosis.diagnose import diagnose
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import form_of
-from focgen.rig.engine import slot_in
+from focgen.rig.placed import slot_in
 from focgen.rig.rig import Actuator, LinearActuator, Rig, Signals
 
 H, T, GAIN, NOISE = 0.05, 0.6, 2.0, 0.1

@@ -14,7 +14,7 @@ from focgen.diagnosis.problem.problem import CandidateEffect
 from focgen.diagnosis.verdict.sizes import at_their_ends, unit_of_parameter
 from focgen.fractional import TransferFunction
 from focgen.rig.effects import form_of, library
-from focgen.rig.engine import slot_in
+from focgen.rig.placed import slot_in
 from focgen.rig.rig import Actuator, LinearActuator, Rig, Signals
 
 COLUMNS = Signals(time="t", command="u_V", pressure="p_bar", curvature="phi_deg", output="y_mV")

@@ -18,7 +18,8 @@ from focgen.diagnosis.diagnose import diagnose
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import Run, form_of
-from focgen.rig.engine import Chain, Placed
+from focgen.rig.engine import Chain
+from focgen.rig.placed import Placed
 from focgen.rig.rig import LinearActuator, Rig, Signals
 
 H, FULL = 0.2, 10.0  # s, largest level

@@ -11,8 +11,8 @@ from focgen.diagnosis.verdict.compose import Rigs
 from focgen.errors import RigError
 from focgen.loop.learned import learned_notes
 from focgen.rig.effects import library
-from focgen.rig.engine import Placed
 from focgen.rig.files import read_rig, write_rig
+from focgen.rig.placed import Placed
 from tests.diagnosis_rig import RIG, session
 
 LAG = {"name": "sensor_lag", "form": "one_lag", "lag": 0.2}

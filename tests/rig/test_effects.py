@@ -14,7 +14,8 @@ from focgen.fractional.transfer import TransferFunction
 from focgen.rig import plant
 from focgen.rig.dynamics import UNCHANGED
 from focgen.rig.effects import EQUATIONS, SLOTS, Excitation, Run, form_of, library
-from focgen.rig.engine import Chain, Placed, slot_in
+from focgen.rig.engine import Chain
+from focgen.rig.placed import Placed, slot_in
 from focgen.rig.plant import Plant
 from focgen.rig.rig import Actuator, Rig, Signals
 from focgen.rig.stages import STAGES

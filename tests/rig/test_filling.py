@@ -9,7 +9,8 @@ import pytest
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
 from focgen.rig.effects import Run, form_of
-from focgen.rig.engine import Chain, Placed
+from focgen.rig.engine import Chain
+from focgen.rig.placed import Placed
 from focgen.rig.rig import Rig, Signals
 
 

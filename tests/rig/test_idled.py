@@ -15,8 +15,8 @@ from focgen.logs.experiment import Experiment
 from focgen.logs.read import in_session_order
 from focgen.rig.carried import raised
 from focgen.rig.effects import library
-from focgen.rig.engine import Placed
 from focgen.rig.initial import in_windows
+from focgen.rig.placed import Placed
 from focgen.rig.recalled import recalled
 from focgen.rig.replay import simulate_session
 from focgen.rig.rig import Actuator, Rig, Signals

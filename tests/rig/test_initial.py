@@ -15,8 +15,9 @@ from focgen.logs.begin import REST, Begin
 from focgen.logs.experiment import Experiment
 from focgen.rig import linear
 from focgen.rig.effects import Run, form_of, library
-from focgen.rig.engine import Chain, Placed, slot_in
+from focgen.rig.engine import Chain
 from focgen.rig.initial import NOTE, begun
+from focgen.rig.placed import Placed, slot_in
 from focgen.rig.rig import Actuator, Delays, LinearActuator, Rig, Signals
 from focgen.rig.session import run_of
 from tests.diagnosis_rig import RIG, H, session

@@ -14,8 +14,9 @@ from focgen.fractional.transfer import TransferFunction
 from focgen.rig import linear
 from focgen.rig.dynamics import Lever
 from focgen.rig.effects import Run, form_of
-from focgen.rig.engine import Chain, Placed
+from focgen.rig.engine import Chain
 from focgen.rig.kernels import BALANCED
+from focgen.rig.placed import Placed
 from focgen.rig.rig import Actuator, LinearActuator, Rig, Signals
 
 H, N = 0.01, 3000

@@ -17,10 +17,11 @@ from focgen.rig import linear, solved
 from focgen.rig.changeable import fits_in, is_damped
 from focgen.rig.dynamics import Bend, Dynamics, Friction, Rise, Spring
 from focgen.rig.effects import Run, form_of
-from focgen.rig.engine import Chain, Placed
+from focgen.rig.engine import Chain
 from focgen.rig.files import read_rig, write_rig
 from focgen.rig.kernels import BALANCED
 from focgen.rig.modes import respond as lag
+from focgen.rig.placed import Placed
 from focgen.rig.plant import Plant, _levels, plant_of, respond
 from focgen.rig.replay import replay
 from focgen.rig.rig import Actuator, LinearActuator, Rig, Signals

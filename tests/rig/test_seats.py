@@ -14,9 +14,10 @@ from focgen.logs.between import Between
 from focgen.rig.changeable import fits_in
 from focgen.rig.dynamics import Dynamics, Friction
 from focgen.rig.effects import Run, form_of
-from focgen.rig.engine import Chain, Placed
+from focgen.rig.engine import Chain
 from focgen.rig.kernels import BALANCED
 from focgen.rig.modes import respond as lag
+from focgen.rig.placed import Placed
 from focgen.rig.plant import Plant, respond
 from focgen.rig.rig import Actuator, LinearActuator, Rig, Signals
 

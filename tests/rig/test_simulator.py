@@ -19,8 +19,9 @@ from focgen.rig import kernels, lags, linear
 from focgen.rig.changeable import fits_in
 from focgen.rig.dynamics import Dynamics
 from focgen.rig.effects import Run, form_of
-from focgen.rig.engine import Chain, Placed
+from focgen.rig.engine import Chain
 from focgen.rig.modes import respond
+from focgen.rig.placed import Placed
 from focgen.rig.replay import effect_tables, placed_in
 from focgen.rig.rig import Actuator, LinearActuator, Rig, Signals
 

@@ -12,9 +12,10 @@ from focgen.errors import RigError
 from focgen.fractional.simulation import Convolution
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig.effects import Run, form_of
-from focgen.rig.engine import Chain, Placed
+from focgen.rig.engine import Chain
 from focgen.rig.kernels import BALANCED
 from focgen.rig.linear import run as linear
+from focgen.rig.placed import Placed
 from focgen.rig.response import check_bounded
 from focgen.rig.rig import Actuator, LinearActuator, Rig, Signals
 from tests.rig.test_simulator import ramp_response

@@ -14,8 +14,9 @@ from scipy.integrate import solve_ivp
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig.changeable import fits_in
 from focgen.rig.effects import Run, form_of
-from focgen.rig.engine import Chain, Placed
+from focgen.rig.engine import Chain
 from focgen.rig.kernels import BALANCED
+from focgen.rig.placed import Placed
 from focgen.rig.rig import Actuator, LinearActuator, Rig, Signals
 
 H, N = 0.01, 3000

@@ -20,7 +20,7 @@ from focgen.diagnosis.problem.problem import CandidateEffect, Problem
 from focgen.rig import kernels
 from focgen.rig.effects import form_of, library
 from focgen.rig.effects._effect import Run, Values
-from focgen.rig.engine import slot_in
+from focgen.rig.placed import slot_in
 
 _SHARP = 20_000  # parts of the range: what readings may lie off a level that is one
 _READINGS = 2  # of one level at most, in the mean: then there is little between the levels

@@ -31,7 +31,8 @@ from focgen.logs.experiment import Experiment
 from focgen.present import present
 from focgen.rig.changeable import fits_in
 from focgen.rig.effects import Effect, library
-from focgen.rig.engine import between_of, slot_in
+from focgen.rig.engine import between_of
+from focgen.rig.placed import slot_in
 from focgen.rig.rig import Actuator, Rig
 from focgen.rig.session import run_of
 

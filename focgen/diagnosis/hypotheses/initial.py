@@ -21,8 +21,9 @@ from focgen.logs.begin import REST, Begin
 from focgen.logs.experiment import Experiment
 from focgen.rig.carried import raised
 from focgen.rig.effects import Run
-from focgen.rig.engine import Chain, Placed
+from focgen.rig.engine import Chain
 from focgen.rig.initial import begun
+from focgen.rig.placed import Placed
 from focgen.rig.recalled import begin_after, ended, memory, with_earlier
 from focgen.rig.rig import Rig
 

@@ -10,7 +10,8 @@ import numpy as np
 from focgen.arrays import Array
 from focgen.diagnosis.problem.segments import Segment
 from focgen.rig.effects import Form, Run
-from focgen.rig.engine import Chain, Placed
+from focgen.rig.engine import Chain
+from focgen.rig.placed import Placed
 from focgen.rig.rig import Actuator, Relative, Rig
 
 _AHEAD = {"actuator": "drive", "regulator": "command", "sensor": "strain"}  # slots ahead of dynamics

@@ -14,7 +14,8 @@ from focgen.diagnosis.problem.excitation import excitation
 from focgen.diagnosis.problem.nominal_parameters import NominalParameters
 from focgen.diagnosis.problem.segments import Segment
 from focgen.rig.effects import Effect, Excitation, Form, Parameter, library
-from focgen.rig.engine import Chain, Placed, slot_in
+from focgen.rig.engine import Chain
+from focgen.rig.placed import Placed, slot_in
 from focgen.rig.rig import Rig
 
 _ZERO = 0.03  # of the level: an offset that is no fault

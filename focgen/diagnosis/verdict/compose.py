@@ -14,8 +14,9 @@ from focgen.diagnosis.fitting.fit import Fit
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import library
-from focgen.rig.engine import Chain, Placed, between_of
+from focgen.rig.engine import Chain, between_of
 from focgen.rig.initial import in_windows
+from focgen.rig.placed import Placed
 from focgen.rig.recalled import recalled, with_recalled
 from focgen.rig.replay import effect_tables, simulate_session
 from focgen.rig.rig import Rig

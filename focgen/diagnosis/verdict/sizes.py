@@ -9,7 +9,7 @@ from focgen.diagnosis.fitting.fit import Fit
 from focgen.diagnosis.hypotheses.rivals import Rival
 from focgen.diagnosis.model import Estimate
 from focgen.rig.effects import Parameter
-from focgen.rig.engine import slot_in
+from focgen.rig.placed import slot_in
 from focgen.rig.rig import Actuator, Rig
 
 _SLACK = 1e-3  # of an end: closer is at it
