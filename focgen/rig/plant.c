@@ -432,7 +432,7 @@ static void settled(Plant *p, State *s, double last, double u)
         double was = s->y;
         sample(p, s, c);
         far = fmax(far, fabs(s->y));
-        if (k && (!s->moving || fabs(s->y - was) < STILL * far)) break;
+        if (k && (!s->moving || fabs(s->y - was) <= STILL * far)) break;
         c[0] = u, c[1] = 0.0;
     }
 }
