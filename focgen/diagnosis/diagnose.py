@@ -30,7 +30,7 @@ from focgen.diagnosis.hypotheses.input_covariance import input_covariance
 from focgen.diagnosis.model import Diagnosis
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.decimate import decimated
-from focgen.diagnosis.problem.segments import Segment, cuts, make
+from focgen.diagnosis.problem.segments import cuts, make
 from focgen.diagnosis.problem.smooth import freed, is_explained, slow_rest, strays
 from focgen.diagnosis.proposals.next_experiment import NEXT, propose
 from focgen.diagnosis.verdict import compose
@@ -152,19 +152,26 @@ def _slow(
     for e in explanations:
         if not e.causes and e.predictability.share <= NUMBERS.left:
             continue
-        segment = e.segment.anew(run=run_of(logs, e.segment.entry))
-        slow = [n for n, family in library().items() if family.slow and family.stage in segment.stages]
-        left = [_left_with(search.nominal, segment, logs, [name]) for name in slow]
-        if left and min(left) < NUMBERS.unlikely * e.square:
+        if _leaves_less(search.nominal, e, logs, [[name] for name in _families(e, "slow")]):
             step("what is slow, from log to log")
             again = search.better(explanations, logs)
             return (again, logs) if again else (explanations, session)
     return explanations, session
 
 
-def _left_with(nominal: Rig, segment: Segment, logs: Sequence[Experiment], names: Sequence[str]) -> float:
-    """The mean square that these families leave, and no others."""
-    return explain(nominal, segment, logs, NUMBERS.nats, names).square
+def _families(e: Explanation, trait: str) -> list[str]:
+    """The families of this trait that may act in an explained segment."""
+    return [n for n, f in library().items() if getattr(f, trait) and f.stage in e.segment.stages]
+
+
+def _leaves_less(
+    nominal: Rig, e: Explanation, logs: Sequence[Experiment], tried: Sequence[Sequence[str]]
+) -> bool:
+    """Whether any of these sets of families, and no others, leaves far less than what was found, where the
+    experiments begin as in ``logs``."""
+    segment = e.segment.anew(run=run_of(logs, e.segment.entry))
+    left = (explain(nominal, segment, logs, NUMBERS.nats, names).square for names in tried)
+    return any(square < NUMBERS.unlikely * e.square for square in left)
 
 
 def _told_by_another(
@@ -242,13 +249,9 @@ def _remembers(search: _Search, e: Explanation, lasting: Sequence[Experiment]) -
     wanders = any(candidate.form.wanders for candidate in e.best.problem.candidates)
     if search.only is not None or not (wanders or e.predictability.share > NUMBERS.left):
         return False
-    segment = e.segment.anew(run=run_of(lasting, e.segment.entry))
-    others = [n for n, family in library().items() if family.remembers and family.stage in segment.stages]
-    found = list(e.best.problem.families)
-    return any(
-        _left_with(search.nominal, segment, lasting, [*found, name]) < NUMBERS.unlikely * e.square
-        for name in others
-    )
+    found = e.best.problem.families
+    beside = [[*found, name] for name in _families(e, "remembers")]
+    return _leaves_less(search.nominal, e, lasting, beside)
 
 
 def _carried_on(
