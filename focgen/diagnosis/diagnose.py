@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
@@ -45,7 +45,7 @@ from focgen.output import check_apart, check_writable
 from focgen.progress import step
 from focgen.replaced import check_own
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
-from focgen.rig.effects import library
+from focgen.rig.effects import Effect, library
 from focgen.rig.initial import in_windows
 from focgen.rig.plausibility import doubts
 from focgen.rig.recalled import all_ahead
@@ -152,16 +152,16 @@ def _slow(
     for e in explanations:
         if not e.causes and e.predictability.share <= NUMBERS.left:
             continue
-        if _leaves_less(search.nominal, e, logs, [[name] for name in _families(e, "slow")]):
+        if _leaves_less(search.nominal, e, logs, [[name] for name in _families(e, lambda f: f.slow)]):
             step("what is slow, from log to log")
             again = search.better(explanations, logs)
             return (again, logs) if again else (explanations, session)
     return explanations, session
 
 
-def _families(e: Explanation, trait: str) -> list[str]:
-    """The families of this trait that may act in an explained segment."""
-    return [n for n, f in library().items() if getattr(f, trait) and f.stage in e.segment.stages]
+def _families(e: Explanation, are: Callable[[Effect], bool]) -> list[str]:
+    """The families that ``are`` of a kind, and may act in an explained segment."""
+    return [n for n, family in library().items() if are(family) and family.stage in e.segment.stages]
 
 
 def _leaves_less(
@@ -249,9 +249,11 @@ def _remembers(search: _Search, e: Explanation, lasting: Sequence[Experiment]) -
     wanders = any(candidate.form.wanders for candidate in e.best.problem.candidates)
     if search.only is not None or not (wanders or e.predictability.share > NUMBERS.left):
         return False
-    found = e.best.problem.families
-    beside = [[*found, name] for name in _families(e, "remembers")]
-    return _leaves_less(search.nominal, e, lasting, beside)
+    found, others = e.best.problem.families, _families(e, lambda f: f.remembers)
+    beside = dict.fromkeys(
+        tuple(sorted({*found, name})) for name in others
+    )  # one that was found adds nothing
+    return _leaves_less(search.nominal, e, lasting, list(beside))
 
 
 def _carried_on(

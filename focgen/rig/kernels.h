@@ -1,5 +1,6 @@
 /* What the compiled loops of the chain simulator offer: see the file of each, and kernels.py, which reads these lines. */
 enum { BALANCED = 2 };
+enum { TABLES = 50, COUNTS = 12 }; /* of a plant, and numbers that each has of a step */
 void focgen_keep_memory(void);
 void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a,
     const double *b0, const double *b1, const double *pair, double through, int switching, double place,

@@ -24,7 +24,6 @@ from focgen.scratch import temporary_folder
 BALANCED = 2
 _AT_ONCE = 1024  # samples that a compiled loop looks at many times: AT_ONCE in ``kernels.c``
 _REGISTERS = 3  # a filter of order 2 is the quickest: one of order 1 is run as such
-_TABLES = 50  # of a plant: of 48 dampers, of its own, and of what is another as it falls
 _SOURCES = [
     Path(__file__).with_name(f"{name}.c") for name in ("kernels", "bending", "plant", "pace", "lever", "weak")
 ]
@@ -209,8 +208,9 @@ def plant(
     ``course``: ``line``, ``bend`` and ``twist`` (n,); ``levels``: the order, and the levels ``base``,
     ``fine`` and ``last``.
     """
-    _, base, _, last = levels
-    *parts, own, room = _doubles(*course, numbers, np.empty(_TABLES * 12 * (last - base + 1)))
+    library, (_, base, _, last) = _library()[1], levels
+    tables = np.empty((library.TABLES, last - base + 1, library.COUNTS))
+    *parts, own, room = _doubles(*course, numbers, tables)
     return _call("focgen_plant", x, rest, *parts, *levels, int(kept), own, room)
 
 

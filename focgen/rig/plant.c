@@ -20,9 +20,9 @@
 #include "bent.h"
 #include "kernels.h"
 
-enum { DIPS = 3, TERMS = 9, COUNTS = 12 }; /* TERMS: of the exponential series; COUNTS: numbers that a table has of a step */
+enum { DIPS = 3, TERMS = 9 }; /* TERMS: of the exponential series */
 enum { LONG = 4000 }; /* samples at most of a rest */
-enum { DAMPERS = 48, PLAIN = DAMPERS, FALLING }; /* tables: of dampers that stand for friction, the plant's own, those as it falls */
+enum { DAMPERS = TABLES - 2, PLAIN = DAMPERS, FALLING }; /* tables: of dampers that stand for friction, the plant's own, as it falls */
 static const double NEAR = 0.1, BESIDE = 0.03; /* how far Taylor series go: of q, as a part of it; of powers and exponentials */
 static const double SAME = 0.01;    /* part of its steepness by which q's differs along a displacement that is as good as another */
 static const double FEW = 0.1;      /* part of its steepness that q loses where it is taken from the way since 0 */
@@ -424,7 +424,7 @@ static State balanced(const Plant *p, double u)
     return come(p, side * high);
 }
 
-/* A state that was left is at rest under `u` after so long a rest, to which the input came in one sample from `last`. */
+/* Leave a plant under `u` until it rests; the input comes there from `last` within a sample. */
 static void settled(Plant *p, State *s, double last, double u)
 {
     double c[4] = {last, u - last, 0.0, 0.0}, far = fabs(s->y);
@@ -439,8 +439,7 @@ static void settled(Plant *p, State *s, double last, double u)
 
 /* n samples of the input: `line`, `bend` and `twist` are what it changes by in a line in the sample that ends at each, and the
  * coefficients of t (t - 1) and t (t - 1)(2 t - 1) beside it; at the first of an experiment, of the sample ahead of it. `tables` is room
- * for (DAMPERS + 2) tables of last - base + 1 steps. Where it is `kept`, later experiments begin where the one before left the plant, after a
- * rest. */
+ * for TABLES of last - base + 1 steps. Where the plant is `kept`, a later experiment begins where the one before left it, after a rest. */
 void focgen_plant(int n, const double *x, double *y, const unsigned char *rest, const double *line, const double *bend, const double *twist,
                   int order, int base, int fine, int last, int kept, const double *numbers, double *tables)
 {

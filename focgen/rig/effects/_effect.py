@@ -108,10 +108,12 @@ class Run:
     def held(self, x: Array) -> Run:
         """The run behind what remembers, whose input is ``x`` (n,): a later experiment that begins with an
         input of 0 begins in equilibrium with what that makes of it."""
+        if self.stands:
+            return self
         rest, still = self.rest.copy(), _STILL * float(np.max(np.abs(x), initial=0.0))
         later = np.flatnonzero(rest)[1:]
         rest[later[(rest[later] == 1) & (np.abs(x[later]) <= still)]] = 2
-        return self if self.stands else replace(self, rest=rest)
+        return replace(self, rest=rest)
 
     @cached_property
     def stood(self) -> Run:
