@@ -14,18 +14,16 @@ from focgen.arrays import Array
 class Begin:
     """A signal before the first sample: ``levels`` (k,) in its unit, the first held for ever, each up to
     ``ago`` (k − 1,) s before that sample, latest last, and the last level up to it. ``known``: earlier logs
-    show it, and nothing of it is estimated. ``carried``: the past of the signal that it comes from made it.
-    ``after``: how long, s, the last sample of the latest earlier log was ago; where that log is simulated
-    just ahead of this one, the signal goes on from it.
+    show it, and nothing of it is estimated. ``after``: how long, s, the last sample of the latest earlier log
+    was ago; where that log is simulated just ahead of this one, the signal goes on from it.
 
     >>> Begin((0.0, 1.5), (3.0,))  # stepped from 0 to 1.5, 3 s before the log begins
-    Begin(levels=(0.0, 1.5), ago=(3.0,), known=False, carried=False, after=None)
+    Begin(levels=(0.0, 1.5), ago=(3.0,), known=False, after=None)
     """
 
     levels: tuple[float, ...] = (0.0,)
     ago: tuple[float, ...] = ()
     known: bool = False
-    carried: bool = False
     after: float | None = None
 
     @property

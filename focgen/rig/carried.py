@@ -33,7 +33,7 @@ def carried(chain: Chain, log: Experiment, entry: str, begin: Begin, last: str) 
     made = chain.run(x, ENTERS[entry], last, run, between_of(chain.rig, entry))
     off = float(np.mean(np.asarray(log[LEAVES[last]], float)[:FIRST] - made[-FIRST:]))
     means, ago = _in_windows(made[: len(past)] + off, log.sample_time)
-    return Begin((float(made[0]), *means), ago, carried=True)
+    return Begin((float(made[0]), *means), ago)
 
 
 def stretched(begin: Begin, times: float) -> Begin:
