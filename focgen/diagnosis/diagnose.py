@@ -146,17 +146,34 @@ def _slow(
 ) -> tuple[tuple[Explanation, ...], tuple[Experiment, ...]]:
     """The findings and the session, made anew with all earlier logs ahead where what is slow leaves far less
     by these than what was found: where every log is taken to begin at rest it is lost to a drift."""
-    logs = all_ahead(search.nominal, session)
-    if search.only is not None or not _begin_elsewise(logs, session):
+    ahead = [logs for logs in all_ahead(search.nominal, session) if _begin_elsewise(logs, session)]
+    if search.only is not None or not ahead:
         return explanations, session
     for e in explanations:
         if not e.causes and e.predictability.share <= NUMBERS.left:
             continue
-        if _leaves_less(search.nominal, e, logs, [[name] for name in _families(e, lambda f: f.slow)]):
+        if (logs := _suits_what_is_slow(search.nominal, e, ahead)) is not None:
             step("what is slow, from log to log")
             again = search.better(explanations, logs)
             return (again, logs) if again else (explanations, session)
     return explanations, session
+
+
+def _suits_what_is_slow(
+    nominal: Rig, e: Explanation, ahead: Sequence[tuple[Experiment, ...]]
+) -> tuple[Experiment, ...] | None:
+    """Of sessions with one pause or another between their logs, the one by which a slow family and no other
+    leaves least, and far less than what was found; None where there is none."""
+    least, best = NUMBERS.unlikely * e.square, None
+    for name in _families(e, lambda f: f.slow):
+        segment = e.segment.anew(run=run_of(ahead[0], e.segment.entry))
+        found = explain(nominal, segment, ahead[0], NUMBERS.nats, [name])
+        for logs in ahead:
+            fit = found.best if logs is ahead[0] else begun_as(found, found.best, logs)
+            left = float(np.mean(fit.weighed**2))
+            if left < least:
+                least, best = left, logs
+    return best
 
 
 def _families(e: Explanation, are: Callable[[Effect], bool]) -> list[str]:

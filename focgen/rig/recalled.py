@@ -141,14 +141,18 @@ def recalled(
     return found if _shows(rig, placed, logs, found, closer and held is None) else tuple(logs)
 
 
-def all_ahead(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
+def all_ahead(rig: Rig, logs: Sequence[Experiment]) -> list[tuple[Experiment, ...]]:
     """The experiments with the earlier ones ahead of them, whether the rig has forgotten these or not: what
     is slow in it has not. Rests longer than it remembers, and than all logs together, are forgotten by
-    that, too. As they are where no clock tells how long ago those were, or in a rig that integrates."""
-    if any(log.paused for log in logs) or integrations(rig) or rig.integrator:
-        return tuple(logs)
+    that, too. Where no clock tells how long ago those were, once for each pause that may have been between
+    two, the shortest first. Not at all of one log, or in a rig that integrates."""
+    if len(logs) < 2 or integrations(rig) or rig.integrator:
+        return []
     past = max(memory(rig, logs), sum(len(log) * log.sample_time for log in logs))
-    return tuple(_recalled(log, _earlier(log, logs), past, False) for log in logs)
+    response = response_time(rig, logs[0].sample_time, longest(logs))
+    pauses = _PAUSES if any(log.paused for log in logs) else (0.0,)
+    sessions = (_spaced(logs, pause * response) for pause in pauses)
+    return [tuple(_recalled(log, _earlier(log, s), past, False) for log in s) for s in sessions]
 
 
 def memory(rig: Rig, logs: Sequence[Experiment]) -> float:
