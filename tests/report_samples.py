@@ -12,8 +12,8 @@ def diagnosis() -> Diagnosis:
     """One effect, and one that is tied with it."""
     parameters = {"width": Estimate(0.4, (0.3, 0.5), "pressure unit")}
     candidates = (
-        Candidate("hysteresis", 0.8, "play", parameters, 0.0),
-        Candidate("friction", 0.15, "coulomb", {}, 0.7),
+        Candidate("hysteresis", "actuator", 0.8, "play", parameters, 0.0),
+        Candidate("friction", "actuator", 0.15, "coulomb", {}, 0.7),
     )
     gof = {"as given": 0.5, "refitted": 0.6, "explained": 0.9, "possible": 0.95}
     return Diagnosis(

@@ -49,7 +49,7 @@ from focgen.rig.effects import Effect, library
 from focgen.rig.initial import in_windows
 from focgen.rig.plausibility import doubts
 from focgen.rig.recalled import all_ahead
-from focgen.rig.replay import experiments
+from focgen.rig.replay import after_session, experiments, with_known
 from focgen.rig.rig import Rig
 from focgen.rig.session import run_of
 
@@ -88,11 +88,11 @@ def diagnose(
     given = (rig, *each, controller)
     if out is not None:
         _check_place(Path(out), given)
-    nominal = rig_of(rig)
+    nominal = with_known(rig_of(rig))
     which = None if controller is None else controller_from(controller)
     if which is not None:
         check_one_unit(nominal, which)
-    session = _usable(experiments(nominal, each, from_, to))
+    session = after_session(nominal, _usable(experiments(nominal, each, from_, to)))
     ran = None if which is None else check_controller(which, session)
     nominal, session = decimated(nominal, session)
     session = with_readings(session)
@@ -113,7 +113,7 @@ def diagnose(
         diagnosis,
         next_experiment=proposed[0] if proposed else None,
         warnings=doubts(nominal, session),
-        refitted=rigs.refitted,
+        refitted=rigs.refitted_after(session),
         augmented=rigs.augmented(session, diagnosis.shrink),
         drawn=drawn_of(rigs.refitted, evidence, session),
     )

@@ -29,10 +29,11 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect that may be the cause. ``confidence``: probability; ``separation``: standard deviations
-    behind the best."""
+    """An effect that may be the cause, in ``stage``. ``confidence``: probability; ``separation``: standard
+    deviations behind the best."""
 
     effect: str
+    stage: str
     confidence: float
     form: str
     parameters: dict[str, Estimate]

@@ -14,6 +14,7 @@ from focgen.identification.single import is_step
 from focgen.identification.sure import misfit_of, relative_halves, times_text
 from focgen.logs.between import noise_level
 from focgen.logs.notes import listed
+from focgen.rig.rig import Rig
 
 _FALL = 0.5  # of the step: the input comes nearer to 0 by at least this in a release
 _WIDE = 0.3  # of a parameter: an interval wider than this says little
@@ -47,6 +48,18 @@ def warnings_of(
             "grows with every load; shuffle them, or repeat the first at the end"
         )
     return tuple(found)
+
+
+def effects_left_out(rig: Rig) -> tuple[str, ...]:
+    """A warning where the rig has effects, which are no part of what is fitted."""
+    names = [f"{effect['name']} of the {effect.get('stage', 'rig')}" for effect in rig.effects]
+    if not names:
+        return ()
+    said = (
+        f"not fitted, and not in the new rig: {listed(names)}, of the rig's file; other numbers make up for "
+        f"that where they can; `focgen diagnose` refits a rig with its effects in it (refitted.toml)"
+    )
+    return (said,)
 
 
 def _model_short(misfit: float, fit: FractionalFit) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from focgen.arguments import checked
 from focgen.custody import identified_from
 from focgen.errors import FitError, LogError, check_choice
-from focgen.identification.caveats import warnings_of
+from focgen.identification.caveats import effects_left_out, warnings_of
 from focgen.identification.digits import told_gain, told_value
 from focgen.identification.excitation import Excitation, is_driven, possible_rests, prepare
 from focgen.identification.fractional import FractionalFit, fit_fractional
@@ -99,7 +99,7 @@ def identify(
     else:
         result = Identification((), None, new, {}, {}, (), ())
     result = replace(result, stages=found)
-    warnings = doubts(nominal, experiments) + result.warnings
+    warnings = effects_left_out(nominal) + doubts(nominal, experiments) + result.warnings
     notes = remarks_of(experiments, nominal, result) + told + result.notes
     result = replace(result, warnings=warnings, notes=notes)
     if out is not None:

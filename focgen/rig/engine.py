@@ -33,12 +33,17 @@ class Chain:
 
     What a step did lately is remembered by its input and parameters, so that only what comes after a changed
     one is run: twice at most, by its place. A ``probe`` runs on what others remember and leaves nothing.
+    Effects that the rig is known to have come ahead of those ``placed``.
     """
 
     rig: Rig
     placed: tuple[Placed, ...] = ()
     remember: dict[Hashable, list[tuple[Hashable, Array, Array]]] | None = None
     probe: bool = False
+
+    def __post_init__(self) -> None:
+        if self.rig.known:
+            self.placed = (*self.rig.known, *self.placed)
 
     def run(
         self,

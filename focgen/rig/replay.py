@@ -221,6 +221,19 @@ def session_end(rig: Rig) -> float:
     return max(clocks, default=0.0)
 
 
+def with_known(rig: Rig) -> Rig:
+    """The rig with its ``[[effects]]`` run wherever it is. Raises RigError as :func:`placed_in` does."""
+    return replace(rig, known=placed_in(rig)) if rig.effects else rig
+
+
+def after_session(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
+    """The logs on the clock of the session that the rig's effects were found in, behind it."""
+    clock = session_end(rig)
+    if not clock or min(log.start for log in logs) >= clock:
+        return tuple(logs)
+    return tuple(replace(log, start=log.start + clock) for log in logs)
+
+
 def effect_tables(
     placed: Sequence[Placed], left: Sequence[dict[str, float]], clock: float
 ) -> tuple[dict[str, Any], ...]:

@@ -11,6 +11,7 @@ from focgen.report.diagnosis_summary import diagnosis_text
 UNITS = {"command": "V", "pressure": "bar", "curvature": "1/mm", "output": "1/mm"}
 CEILING = Candidate(
     "supply_saturation",
+    "regulator",
     0.9,
     "hard",
     {

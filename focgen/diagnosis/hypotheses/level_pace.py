@@ -62,7 +62,8 @@ def slower_by(rig: Rig, stage: str, size: float) -> float:
 
 
 def _core(rig: Rig, stage: str) -> tuple[Rig, float]:
-    """A stage from behind that slot on, and its gain."""
+    """A stage from behind that slot on, without effects, and its gain."""
+    rig = replace(rig, known=())
     if stage != "actuator":
         return rig, getattr(rig, stage).dc_gain
     actuator = rig.actuator

@@ -48,8 +48,10 @@ class Part:
     def chain(self, vector: np.ndarray | None = None) -> Chain:
         """It with these parameters, or its own."""
         vector = self.vector if vector is None else vector
-        placed = (replace(p, carried=c) for p, c in zip(self.problem.placed(vector), self.left))
-        return Chain(self.problem.rig(vector), tuple(placed))
+        rig = self.problem.rig(vector)
+        every = (*rig.known, *self.problem.placed(vector))
+        after = tuple(replace(p, carried=c) for p, c in zip(every, self.left, strict=True))
+        return Chain(replace(rig, known=after[: len(rig.known)]), after[len(rig.known) :])
 
 
 @dataclass(frozen=True, eq=False)

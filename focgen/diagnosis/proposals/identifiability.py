@@ -23,7 +23,7 @@ from focgen.logs.read import Logs, each_of
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.effects import Excitation, Run, library
 from focgen.rig.engine import Chain
-from focgen.rig.replay import experiments
+from focgen.rig.replay import experiments, with_known
 from focgen.rig.response import check_bounded, integrations, longest, response_time
 from focgen.rig.rig import Rig
 from focgen.rig.stages import LEAVES
@@ -70,7 +70,7 @@ def plan(rig: RigLike, logs: Logs = ()) -> Plan:
 
     Only the inputs of the logs are used. Raises RigError and LogError for files that cannot be used.
     """
-    nominal, each = rig_of(rig), each_of(logs)
+    nominal, each = with_known(rig_of(rig)), each_of(logs)
     session = experiments(nominal, each) if each else _menu(nominal)
     roles = cuts(session)
     response = response_time(nominal, session[0].sample_time, longest(session))

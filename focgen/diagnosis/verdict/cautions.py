@@ -18,8 +18,17 @@ from focgen.diagnosis.verdict.restless import louder
 from focgen.diagnosis.verdict.sizes import at_their_ends
 from focgen.diagnosis.verdict.summary import Summary, doubts
 from focgen.diagnosis.verdict.unexplained import acts_besides, disturbed, is_driven
+from focgen.logs.notes import listed
+from focgen.rig.rig import Rig
 
 _NEAR = 0.95  # of the error without any effect: with more a family is not near
+
+
+def of_file(rig: Rig) -> tuple[str, ...]:
+    """A note where the rig's file has effects."""
+    names = [f"{p.effect} of the {p.stage}" for p in rig.known]
+    said = f"taken as the rig's file has it, and what else is there is looked for: {listed(names)}"
+    return (said,) if names else ()
 
 
 def cautions(

@@ -3,7 +3,7 @@ simulated."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
@@ -32,36 +32,49 @@ class Rigs:
     fitted: Rig
     placed: tuple[Placed, ...]
 
+    def refitted_after(self, logs: Sequence[Experiment]) -> Rig:
+        """The refitted rig as a file has it, with what of the effects it was given outlives this session."""
+        return _after(self.refitted, (), logs)
+
     def augmented(self, logs: Sequence[Experiment], promise: float | None = None) -> Rig:
         """The rig that carries its effects, what outlives this session, the outputs that they were learned
         at, and the share that they ``promise`` to explain."""
-        left: list[dict[str, float]] = []
-        entry = "command" if all("command" in log for log in logs) else "pressure"
-        x = joined(logs, entry)
-        first = "regulator" if entry == "command" else "actuator"
-        run = run_of(logs, entry)
-        Chain(self.fitted, self.placed).run(
-            x, first, "sensor", run, between_of(self.fitted, entry), left=left
-        )
-        clock = max(log.start + len(log) * log.sample_time for log in logs)
         told: dict[str, Any] = {
             "learned": [float(f([f(log["output"]) for log in logs])) for f in (np.min, np.max)]
         }
         told |= {"promise": float(promise)} if promise is not None else {}
-        tables = effect_tables(self.placed, left, clock)
-        return replace(self.fitted, effects=tuple(table | told for table in tables))
+        return _after(self.fitted, self.placed, logs, told)
+
+
+def _after(
+    rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment], told: Mapping[str, Any] | None = None
+) -> Rig:
+    """A rig after a session, its effects as a file has them: those that it was given, with what they were
+    ``told`` then, ahead of those ``placed``."""
+    left: list[dict[str, float]] = []
+    entry = "command" if all("command" in log for log in logs) else "pressure"
+    first = "regulator" if entry == "command" else "actuator"
+    chain = Chain(rig, tuple(placed))
+    if chain.placed:
+        x, run = joined(logs, entry), run_of(logs, entry)
+        chain.run(x, first, "sensor", run, between_of(rig, entry), left=left)
+    clock = max(log.start + len(log) * log.sample_time for log in logs)
+    besides = [{k: v for k, v in table.items() if k in ("learned", "promise")} for table in rig.effects]
+    besides += [dict(told or {})] * len(placed)
+    tables = effect_tables(chain.placed, left, clock)
+    effects = tuple(table | beside for table, beside in zip(tables, besides, strict=True))
+    return replace(rig, effects=effects, known=())
 
 
 def compose(rig: Rig, explanations: Sequence[Explanation], logs: Sequence[Experiment]) -> Rigs:
     """Own parameters and effects from all segments. Each was fitted by itself: where the output of the whole
     chain comes no closer by it, as where what one stage's refit makes up for is mended in another, segments
     keep what was given; those with effects keep what was fitted beside them."""
-    given = replace(rig, effects=())
     placed = tuple(p for e in explanations for p in e.best.problem.placed(e.best.vector))
     beside = [e.best for e in explanations if e.best.problem.candidates]
     alone = [e.best for e in explanations if not e.best.problem.candidates]
-    refitted = _closest(given, [e.nominal for e in explanations], (), logs)
-    fitted = _closest(_moved(given, beside), alone, placed, logs) if placed else refitted
+    refitted = _closest(rig, [e.nominal for e in explanations], (), logs)
+    fitted = _closest(_moved(rig, beside), alone, placed, logs) if placed else refitted
     return Rigs(refitted, fitted, placed)
 
 

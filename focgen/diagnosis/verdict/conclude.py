@@ -21,6 +21,7 @@ from focgen.diagnosis.verdict.cautions import (
     ended,
     gauges,
     lesser,
+    of_file,
     paced,
     rounded,
     the_rest,
@@ -82,6 +83,7 @@ def conclude(
         next_experiment=None,
         unexplained=_description(unknown) | _departing(controller),
         notes=(
+            *of_file(rig),
             *notes_of(logs),
             *far,
             *cautions(summary.causes, unknown, list(doubted), [*off, *nominal_alone(explanations, off)]),
@@ -126,7 +128,7 @@ def _departing(controller: ControllerCheck | None) -> dict[str, object]:
 
 def _suspected(d: Departure, confidence: float) -> Candidate:
     parameters = {d.parameter: Estimate(d.value, (d.value, d.value), d.unit)}
-    return Candidate(d.effect, confidence, "running", parameters, 0.0)
+    return Candidate(d.effect, "controller", confidence, "running", parameters, 0.0)
 
 
 def _word(found: Sequence[Found], unknown: Sequence[Explanation], explanations: Sequence[Explanation]) -> str:
@@ -234,9 +236,9 @@ def _candidate(rival: Rival, confidence: float, rig: Rig) -> Candidate:
     for i in places:
         prefix = "" if i == places[0] else f"{candidate[i].form.name}."
         parameters |= {prefix + k: v for k, v in estimates(rival.fit, i, rig).items()}
-    return Candidate(
-        rival.effect, confidence, candidate[places[0]].form.name, parameters, float(rival.separation)
-    )
+    likeliest = candidate[places[0]]
+    separation = float(rival.separation)
+    return Candidate(rival.effect, likeliest.stage, confidence, likeliest.form.name, parameters, separation)
 
 
 def _ordered(found: Sequence[Found]) -> tuple[Found, ...]:

@@ -22,7 +22,7 @@ from focgen.present import present
 
 _SPAN = [(float, None)]
 _ESTIMATE = {"value": (float, None), "ci95": _SPAN, "unit": str}
-_CANDIDATE = {
+_CANDIDATE = {  # and its stage, which earlier versions did not write
     "effect": str,
     "confidence": float,
     "form": str,
@@ -80,6 +80,7 @@ def _sound(value: dict[str, Any]) -> bool:
     return (
         all(span is None or len(span) == 2 for span in spans)
         and all(0.0 <= candidate["confidence"] <= 1.0 for candidate in candidates)
+        and all(isinstance(candidate.get("stage", ""), str) for candidate in candidates)
         and all(cause["candidates"] for cause in value["causes"])
         and all(fits(share, (float, None)) for share in value["where"]["share"].values())
         and all(fits(estimate, _ESTIMATE) and len(estimate["ci95"]) == 2 for estimate in estimates)
@@ -89,7 +90,7 @@ def _sound(value: dict[str, Any]) -> bool:
 
 
 def _found(value: dict[str, Any]) -> Found:
-    candidates = tuple(_candidate(one) for one in value["candidates"])
+    candidates = tuple(_candidate({"stage": value["stage"]} | one) for one in value["candidates"])
     return Found(value["stage"], candidates, _real(value["shrink"]), present(_pair(value["shrink_interval"])))
 
 
@@ -98,9 +99,8 @@ def _candidate(value: dict[str, Any]) -> Candidate:
         name: Estimate(_real(e["value"]), present(_pair(e["ci95"])), e["unit"])
         for name, e in value["parameters"].items()
     }
-    return Candidate(
-        value["effect"], value["confidence"], value["form"], parameters, _real(value["separation"])
-    )
+    effect, stage, confidence, form = (value[k] for k in ("effect", "stage", "confidence", "form"))
+    return Candidate(effect, stage, confidence, form, parameters, _real(value["separation"]))
 
 
 def _real(value: float | None) -> float:
