@@ -21,6 +21,8 @@ IN_STEPS = frozenset({"spring", "rise", "place", "stiffness", "preload", "unload
 def fits_in(form: Form, stage: str, rig: Rig) -> bool:
     """Whether a form can act in a stage of this rig: what it changes of the actuator's own equation has to be
     in that equation."""
+    if form.adds_up and not (stage == "regulator" and rig.integrator == "regulator"):
+        return False
     if form.slot == "spring":
         return stage == "actuator" and rig.actuator is not None and _has_spring(rig.actuator)
     if form.slot not in EQUATIONS.values():

@@ -25,6 +25,7 @@ _FIRST = 5  # samples that show it, at least
 _APART = 5.0  # standard errors by which the first samples are off from 0
 _ROUNDING = 1e-6  # of a signal's reach: less is no gauge's noise,
 _REAL = 1e-9  # of a root: an imaginary part of rounding
+_SECANTS = 8
 _UNKNOWN = 0.003  # and so much is then taken for it
 
 
@@ -34,8 +35,10 @@ def standing(rig: Rig, log: Experiment, placed: Sequence[Placed], note: str) -> 
     on has moved beyond the noise. What moves from the first sample on is to be further off than it goes
     meanwhile, for a dead time leaves as much."""
     role = _behind(rig, log)
-    off = _off(rig, log, placed, role) if role else 0.0
+    off, still = _off(rig, log, placed, role) if role else (0.0, 0)
     place = _place(rig, role, off) if role and off else 0.0
+    if place and role and (placed or rig.known):
+        place = _closer(rig, log, placed, role, place, still)
     begins = dict(log.begins)
     if role == "curvature":
         begins.pop(role, None)
@@ -60,18 +63,44 @@ def _behind(rig: Rig, log: Experiment) -> str | None:
     return next((LEAVES[stage] for stage in stages if LEAVES[stage] in log), None)
 
 
-def _off(rig: Rig, log: Experiment, placed: Sequence[Placed], role: str) -> float:
-    """How far a signal is off at first from what the rig makes from 0 on; 0 where that does not show."""
+def _closer(
+    rig: Rig, log: Experiment, placed: Sequence[Placed], role: str, place: float, still: int
+) -> float:
+    """What leaves the stage that integrates where the rig with what is ``placed``, which may bend what is
+    made of it, comes to the first samples: a few steps along the secant from there."""
+    y = np.asarray(log[role], float)[log.read(role)][:still]
+
+    def off(at: float) -> float:
+        return float(np.median(y - _made(rig, log, placed, role, at)[:still]))
+
+    before, at, off_before, off_at = 0.0, place, off(0.0), off(place)
+    for _ in range(_SECANTS):
+        if off_at in (0.0, off_before) or not np.isfinite(off_at):
+            break
+        step = off_at * (at - before) / (off_before - off_at)
+        before, at, off_before = at, at + float(np.clip(step, -0.5 * abs(place), 0.5 * abs(place))), off_at
+        off_at = off(at)
+    return at if abs(off_at) < abs(off(place)) else place
+
+
+def _made(rig: Rig, log: Experiment, placed: Sequence[Placed], role: str, stands: float = 0.0) -> Array:
+    """What the rig makes of a signal, at its readings, where it stood there as the log began."""
     entry = "command" if "command" in log else "pressure"
-    if len(log) < 2 * _FIRST:
-        return 0.0
-    run = Run.of([len(log)], [log.start], log.sample_time, [log.before(entry)])
+    run = Run.of([len(log)], [log.start], log.sample_time, [log.before(entry)], stands=[stands])
     chain = Chain(rig, tuple(placed))
     last = next(stage for stage in STAGES if LEAVES[stage] == role)
     made = chain.run(np.asarray(log[entry], float), ENTERS[entry], last, run, between_of(rig, entry))
-    made, y = made[log.read(role)], np.asarray(log[role], float)[log.read(role)]
+    return made[log.read(role)]
+
+
+def _off(rig: Rig, log: Experiment, placed: Sequence[Placed], role: str) -> tuple[float, int]:
+    """How far a signal is off at first from what the rig makes from 0 on, 0 where that does not show, and how
+    many samples say so."""
+    if len(log) < 2 * _FIRST:
+        return 0.0, 0
+    made, y = _made(rig, log, placed, role), np.asarray(log[role], float)[log.read(role)]
     if len(y) < 2 * _FIRST:
-        return 0.0
+        return 0.0, 0
     off = y - made
     noise = white_level(off)
     if white_level(y) < _ROUNDING * float(np.ptp(y)):  # as of rows that a logger filled in
@@ -80,9 +109,9 @@ def _off(rig: Rig, log: Experiment, placed: Sequence[Placed], role: str) -> floa
     found, drifted = float(np.median(off[:still])), abs(np.mean(off[still - 2 : still]) - np.mean(off[:2]))
     unsure = _APART * noise / np.sqrt(still) + 2.0 * (np.ptp(made[: still + 2]) + drifted)
     if abs(found) > unsure:
-        return found
+        return found, still
     moving = still == _FIRST and rig.integrator == "regulator"
-    return _for_good(off, made) if moving else 0.0
+    return (_for_good(off, made), still) if moving else (0.0, still)
 
 
 def _for_good(off: Array, made: Array) -> float:

@@ -5,15 +5,18 @@ begins empty, or when an earlier log's strokes are not put ahead of the next.
 """
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
-from focgen.rig.effects import Run
+from focgen.rig.changeable import fits_in
+from focgen.rig.effects import Run, library
 from focgen.rig.engine import Chain
 from focgen.rig.initial import NOTE, begun
+from focgen.rig.placed import Placed
 from focgen.rig.recalled import with_recalled
 from focgen.rig.replay import simulate_session
 from focgen.rig.rig import Actuator, LinearActuator, Rig, Signals
@@ -102,3 +105,50 @@ def test_strokes_of_an_earlier_log_are_ahead_of_the_next():
     recalled = with_recalled(rig, told, cost)
     assert recalled[1].before("command").known
     assert cost(recalled) < 0.3 * cost(told)
+
+
+def placed(effect, form, *values, stage="regulator"):
+    of = library()[effect]
+    return Placed(effect, next(f for f in of.forms if f.name == form), stage, values)
+
+
+def in_small_steps(flow, stood, act):
+    """The volume of a pump without a lag, which runs in lines: 200 steps a sample."""
+    volume, found = stood, [stood]
+    for q, then in pairwise(flow):
+        for j in range(200):
+            volume = act(volume + 0.95 * (q + (then - q) * (j + 0.5) / 200) * H / 200, H / 200)
+        found.append(volume)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("stood", [0.0, 3.0])
+@pytest.mark.parametrize(
+    "lost, act",
+    [
+        (placed("leak", "running_out", 0.05), lambda v, h: v * np.exp(-0.05 * h)),
+        (placed("supply_saturation", "spilt", 4.0), lambda v, h: min(v, 4.0)),
+    ],
+    ids=["leak", "relief"],
+)
+def test_what_a_pump_has_put_in_is_lost_for_good(lost, act, stood):
+    """Red when a leak or a relief valve only bends what is read of a volume."""
+    pump = replace(RIGS["whole"], regulator=TransferFunction([(0.95, 0.0)], [(1.0, 1.0)]))
+    run = Run.of([len(FLOW)], [0.0], H, stands=[stood])
+    made = Chain(pump, (lost,)).run(np.asarray(FLOW, float), "regulator", "regulator", run)
+    assert np.max(np.abs(made - in_small_steps(FLOW, stood, act))) < 0.01
+    assert fits_in(lost.form, "regulator", pump)
+    assert not fits_in(lost.form, "regulator", replace(pump, regulator=SENSOR))
+
+
+def test_a_volume_is_told_through_a_curve():
+    """Red when what a pump held is told as if the actuator did not bend what it makes of it."""
+    rig, curve = RIGS["whole"], placed("gain_nonlinearity", "force_factor", 0.5, 0.0, 12.0, stage="actuator")
+    tap: dict = {}
+    Chain(rig, (curve,)).run(
+        np.asarray(FLOW, float), "regulator", "sensor", Run.of([len(FLOW)], [0.0], H), tap=tap
+    )
+    log = cut(Experiment("log1", H, {"command": np.asarray(FLOW, float), "output": tap["sensor"]}), 390)
+    volume = tap["regulator"][390]
+    bent, even = (begun(rig, [log], of)[0].stands for of in ((curve,), ()))
+    assert abs(bent - volume) < 0.2 * abs(even - volume)

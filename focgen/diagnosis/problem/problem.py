@@ -13,7 +13,7 @@ import numpy as np
 from focgen.diagnosis.problem.excitation import excitation
 from focgen.diagnosis.problem.nominal_parameters import NominalParameters
 from focgen.diagnosis.problem.segments import Segment
-from focgen.rig.effects import Effect, Excitation, Form, Parameter, library
+from focgen.rig.effects import Effect, Excitation, Form, Parameter, Run, library
 from focgen.rig.engine import Chain
 from focgen.rig.placed import Placed, slot_in
 from focgen.rig.rig import Rig
@@ -23,6 +23,7 @@ _ALIGNED = 0.5  # of the slack of columns: what a standard deviation is; a delay
 _OFF = 3.0  # standard deviations that an input may be off in each way
 _FAR_OFF = 20.0  # the same of a zero that no effect moves
 _QUICKEST = 4.0  # means of samples in a response at least
+_STANDS = 0.1  # of the level: what a volume is off by that is told through an actuator
 _BASELINE = 0.005  # of the level: what the zero of a reading differs by from one experiment to the next
 
 
@@ -69,7 +70,8 @@ class Problem:
     ``slack`` samples; where nothing of the segment has an offset of its own, one, and its gauge's error, at
     most ``gauge`` of what it reads; how far a simulated input is off in each of the ways it may be, in
     standard deviations; how far the begins of experiments are, likewise; where readings are ``uneven``, the
-    zero of each experiment's, likewise), then every candidate effect's parameters, all of order one.
+    zero of each experiment's, likewise; where what a pump held is told through an actuator, how far each
+    experiment's is off, likewise), then every candidate effect's parameters, all of order one.
     ``weight``: of what is known of nominal parameters beforehand, against the data.
     """
 
@@ -87,7 +89,7 @@ class Problem:
         self.nominal_start = self.nominals.start()
         zero = [] if self.nominals.has_offset else [_ZERO]
         self.gauges = [*zero, self.gauge] if self.gauge else zero
-        self.nuisances = 1 + len(self.gauges) + self.ways + self.zeros
+        self.nuisances = 1 + len(self.gauges) + self.ways + self.zeros + self.stood
 
     @property
     def ways(self) -> int:
@@ -99,6 +101,13 @@ class Problem:
     def zeros(self) -> int:
         """How many experiments have a zero of their own."""
         return len(self.segment.run.spans) if self.uneven else 0
+
+    @property
+    def stood(self) -> int:
+        """How many experiments began with what a pump held, told through an actuator: what that makes of it
+        is known no better than the rig."""
+        through = self.segment.stages[0] == "regulator" and len(self.segment.stages) > 1
+        return len(self.segment.run.stands) if through and self.nominals.rig.integrator == "regulator" else 0
 
     @cached_property
     def excitation(self) -> Excitation:
@@ -165,8 +174,9 @@ class Problem:
     def known(self) -> tuple[np.ndarray, np.ndarray]:
         """What every entry is expected to be beforehand, and how well that is known: 1/variance."""
         own, aligned = self.weight * self.nominals.precision, (self.slack * _ALIGNED) ** -2.0
-        free, effects = self.nuisances - 1 - self.zeros, sum(len(c.form.parameters) for c in self.candidates)
-        precision = np.r_[own, aligned, np.zeros(free), np.ones(self.zeros), np.zeros(effects)]
+        each, effects = self.zeros + self.stood, sum(len(c.form.parameters) for c in self.candidates)
+        free = self.nuisances - 1 - each
+        precision = np.r_[own, aligned, np.zeros(free), np.ones(each), np.zeros(effects)]
         return np.pad(self.nominal_start, (0, len(precision) - len(own))), precision
 
     def unlikely(self, vector: np.ndarray) -> float:
@@ -177,7 +187,7 @@ class Problem:
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper bounds."""
         ends = self.nominals.bounds()
-        zeros = [self._drift] * self.zeros
+        zeros = [*[self._drift] * self.zeros, *[_OFF] * self.stood]
         nuisance = [0.0 if self._shifted else self.slack, *self.gauges, *[_OFF] * self.ways, *zeros]
         low: list[float] = [*ends[0], *(-b for b in nuisance)]
         high: list[float] = [*ends[1], *nuisance]
@@ -259,24 +269,31 @@ class Problem:
         ones, which no fit takes: that is no fault to warn of."""
         chain = Chain(self.rig(vector), self.placed(vector), self.memory, probe)
         own, segment = len(self.nominal_start), self.segment
-        gauges, off, begun, zeros = self._parted(vector[own + 1 : self.head])
+        gauges, off, begun, zeros, stood = self._parted(vector[own + 1 : self.head])
         x = self._entered(float(vector[own]), off, probe)
-        fed = segment.fed
         with np.errstate(over="ignore", invalid="ignore"):
-            made = chain.run(x, segment.stages[0], segment.stages[-1], fed.run, segment.between)
+            made = chain.run(x, segment.stages[0], segment.stages[-1], self._begun(stood), segment.between)
         made = self._read(made if segment.readings is None else made[segment.readings], *gauges)
         made = made + segment.loose @ begun if len(begun) and begun.any() else made
         return made + self._uneven(zeros) if len(zeros) and zeros.any() else made
 
     def _parted(self, nuisances: np.ndarray) -> tuple[np.ndarray, ...]:
-        """The nuisances behind the alignment: of gauges, of the input's ways, of begins, and of zeros."""
-        gauges, ways = len(self.gauges), self.segment.input_modes.shape[1]
-        begun, end = gauges + ways, len(nuisances) - self.zeros
-        return nuisances[:gauges], nuisances[gauges:begun], nuisances[begun:end], nuisances[end:]
+        """The nuisances behind the alignment: of gauges, of the input's ways, of begins, of zeros, and of
+        what a pump held."""
+        ways = self.segment.input_modes.shape[1]
+        return tuple(np.split(nuisances, np.cumsum([len(self.gauges), ways, self.ways - ways, self.zeros])))
+
+    def _begun(self, stood: np.ndarray) -> Run:
+        """The run, with what a pump held as each experiment began off by so many standard deviations."""
+        run = self.segment.fed.run
+        if not stood.any():
+            return run
+        off = _STANDS * self.nominals.level_in * stood
+        return replace(run, stands=tuple(float(s + o) if s else s for s, o in zip(run.stands, off)))
 
     def begun(self, vector: np.ndarray) -> np.ndarray:
         """How far each of the segment's ``loose`` ways (k,) is there."""
-        end = self.head - self.zeros
+        end = self.head - self.zeros - self.stood
         return vector[end - self.segment.loose.shape[1] : end]
 
     def _uneven(self, zeros: np.ndarray) -> np.ndarray:
@@ -287,7 +304,7 @@ class Problem:
     def level(self, vector: np.ndarray) -> np.ndarray:
         """``vector`` with the zeros of all experiments alike."""
         alike = vector.copy()
-        alike[self.head - self.zeros : self.head] = 0.0
+        alike[self.head - self.zeros - self.stood : self.head - self.stood] = 0.0
         return alike
 
     def _read(self, made: np.ndarray, zero: float = 0.0, gauge: float = 0.0) -> np.ndarray:

@@ -124,6 +124,12 @@ class Run:
         return replace(self, rest=rest, stands=())
 
     @property
+    def stood_by_span(self) -> list[tuple[int, int, float]]:
+        """Every span, and where a stage that integrates stood as it began."""
+        stands = self.stands or (0.0,) * len(self.spans)
+        return [(a, b, stood) for (a, b), stood in zip(self.spans, stands)]
+
+    @property
     def spans(self) -> list[tuple[int, int]]:
         """First sample and the one after the last, by experiment."""
         firsts = np.flatnonzero(self.rest).tolist()
@@ -172,6 +178,7 @@ class Form:
     (1 − exp(−w/scale)), w the ``largest`` that it was bent by, the ``work`` done or its ``retreat`` from the
     largest; empty where it is another function.
     ``bare``: only in a stage that the rig takes for 1: dynamics have the like in their own equation.
+    ``adds_up``: only in a regulator that adds up what it is told, as a pump does.
     ``itself(values, den)``: whether it is what its family says, in an actuator of this denominator.
     """
 
@@ -189,6 +196,7 @@ class Form:
     rarer: bool = False
     wears: str = ""
     bare: bool = False
+    adds_up: bool = False
     itself: Callable[[Values, Polynomial], bool] = lambda values, den: True
 
     @property

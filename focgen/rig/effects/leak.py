@@ -1,6 +1,7 @@
 """A leak behind the regulator: the chamber stays below the regulated pressure, the more the higher it is."""
 
 import numpy as np
+from scipy.signal import lfilter
 
 from focgen.arrays import Array
 from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter, Run, Values
@@ -17,6 +18,16 @@ def _turbulent(x: Array, values: Values, run: Run) -> Array:
 def _growing(x: Array, values: Values, run: Run) -> Array:
     share, scale = values
     return x * (1.0 - share * np.minimum(np.abs(x) / scale, 1.0))
+
+
+def _running_out(x: Array, values: Values, run: Run) -> Array:
+    """What a pump has put in runs out at a rate that goes with what there is: x less what is lost so far."""
+    kept, made = np.exp(-values[0] * run.h), np.empty(len(x))
+    for a, b, stood in run.stood_by_span:
+        put_in = np.sqrt(kept) * np.diff(x[a:b], prepend=x[a])  # which comes evenly from sample to sample
+        put_in[0] = x[a] + stood
+        made[a:b] = lfilter([1.0], [1.0, -kept], put_in) - stood
+    return made
 
 
 EFFECT = Effect(
@@ -53,6 +64,17 @@ EFFECT = Effect(
                 LARGEST,
             ),
             _growing,
+        ),
+        Form(
+            "running_out",
+            "supply",
+            (
+                Parameter(
+                    "rate", time=-1, lower=0.0, upper=100.0, starts=(0.1, 1.0), clock="record", zero=0.0
+                ),
+            ),
+            _running_out,
+            adds_up=True,
         ),
     ],
 )

@@ -44,6 +44,15 @@ def _fed(x: Dynamics, values: Values, run: None) -> Dynamics:
     return replace(x, supply=min(x.supply, values[0]))
 
 
+def _spilt(x: Array, values: Values, run: Run) -> Array:
+    """What a pump puts in beyond the ceiling is let out for good: x less the most that was beyond so far."""
+    made = np.empty(len(x))
+    for a, b, stood in run.stood_by_span:
+        beyond = np.maximum(x[a:b] + stood - values[0], 0.0)
+        made[a:b] = x[a:b] - np.maximum.accumulate(beyond)
+    return made
+
+
 def _drawn(x: Array, values: Values, run: Run) -> Array:
     return kernels.drawn(x, run.rest, run.h, *values)
 
@@ -62,6 +71,8 @@ EFFECT = Effect(
         Form("fed", "chamber", (_CEILING,), _fed),
         # a relief valve opens at once, and there is nothing above to come down from
         Form("relieved", "chamber", (_CEILING,), _stops),
+        # and so it does beside a pump
+        Form("spilt", "supply", (_CEILING,), _spilt, adds_up=True),
         # an amplifier clips what goes either way
         Form("both_ways", "supply", (_CEILING,), _both_ways, both_ways=True),
         # a tank gives what it has, and a pump takes its time to refill it
