@@ -6,7 +6,8 @@ import math
 
 from focgen.fractional.weights import short_memory_bias
 from focgen.plan.canonical import realise
-from focgen.plan.integrals import STEPS, added_up, coarse, smallest_error
+from focgen.plan.integrals import STEPS, added_up
+from focgen.plan.least_error import coarse, out_of_reach, since_reset, smallest_error
 from focgen.plan.plan import Plan
 
 _SHARE = 0.01  # of what an integral can be off by in the end
@@ -39,7 +40,10 @@ def _held(plan: Plan) -> list[str]:
     found, added = [], added_up(plan)
     wider = {"q15": "choose q31 or f32", "q31": "choose f64"}.get(plan.arithmetic, "lengthen the sample time")
     if coarse(plan):
-        what = f"a steady error below {smallest_error(plan):.3g} never moves the integral"
+        what = f"a steady error below {smallest_error(plan):.3g} may be left: the integral need not move"
+        if out_of_reach(plan):
+            what = "no steady error within the ranges is sure to move the integral"
+        what += ", even after a reset to it" if since_reset(plan) else ""
         found.append(f"{plan.name} [gain]: {what}; raise the gain, or {wider}")
     if added is not None and added > 0.5:
         what = f"one increment can be so large that rounding adds up to {added:.2g} digits of the output"
