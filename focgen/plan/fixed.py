@@ -64,9 +64,8 @@ def signals(controller: Controller, word: Word) -> Signals:
     """Formats of the inputs, whose difference must fit as well, and of the output."""
     where, ranges, unit = f"{controller.name} [ranges]", controller.ranges, controller.units.measurement
     (r0, r1), (m0, m1) = ranges.reference, ranges.measurement
-    exponent = exponent_for(
-        max(map(abs, (r0, r1, m0, m1))), word.limit, where, "the reference or measurement"
-    )
+    most = word.limit - 1  # one count is left for what is out of range, above as below
+    exponent = exponent_for(max(map(abs, (r0, r1, m0, m1))), most, where, "the reference or measurement")
     while True:
         ref = span_of(r0, r1, exponent, where, "reference")
         meas = Interval(0, 0) if (m0, m1) == NOTHING else span_of(m0, m1, exponent, where, "measurement")
@@ -75,7 +74,7 @@ def signals(controller: Controller, word: Word) -> Signals:
             break
         exponent += 1
     low, high = ranges.output
-    output = exponent_for(max(abs(low), abs(high)), word.limit, where, "the output")
+    output = exponent_for(max(abs(low), abs(high)), most, where, "the output")
     r, y, e = (_format(word.bits, exponent, x, unit) for x in (ref, meas, error))
     u = _format(word.bits, output, span_of(low, high, output, where, "output"), controller.units.output)
     return Signals(r, y, e, exponent, u, output)
