@@ -58,6 +58,7 @@ class ReadmeContext:
     signals: list[Signal]
     scheduled: bool
     integral: bool
+    inner: bool
     state_bytes: int
     table_bytes: int
     multiplies: int
@@ -105,6 +106,7 @@ def readme_context(
         signals=_signals(plan),
         scheduled=plan.schedule is not None,
         integral=plan.integrator is not None,
+        inner=plan.inner is not None,
         state_bytes=size["state_bytes"],
         table_bytes=size["table_bytes"],
         multiplies=plan.multiplies,

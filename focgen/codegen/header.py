@@ -47,6 +47,7 @@ class HeaderContext:
     members: tuple[Member, ...]
     state_bytes: int
     integral: bool
+    inner: bool
     scheduled: bool
     counted: Counted | None
     conversions: list[Conversion]
@@ -78,6 +79,7 @@ def header_context(
         members=members(plan, kernels),
         state_bytes=state_bytes(plan, kernels),
         integral=plan.integrator is not None,
+        inner=plan.inner is not None,
         scheduled=plan.schedule is not None,
         counted=None if plan.floating else counted(plan.output),
         conversions=conversions(plan) if floats else [],

@@ -20,7 +20,7 @@ def remarks(plan: Plan) -> list[str]:
     found = [*_held(plan), *_beside_whole(plan)]
     if plan.inner is None:
         return found
-    return [*found, *_adding_up(plan), *_ramp(plan), *_trapezoid(plan)]
+    return [*found, _beside_output(plan), *_adding_up(plan), *_ramp(plan), *_trapezoid(plan)]
 
 
 def _beside_whole(plan: Plan) -> list[str]:
@@ -50,6 +50,20 @@ def _held(plan: Plan) -> list[str]:
         remedy = "narrow the input ranges, or choose q31 or f64"
         found.append(f"{plan.name} [ranges]: {what} in {STEPS:.0e} samples; {remedy}")
     return found
+
+
+def _beside_output(plan: Plan) -> str:
+    """What the integral of the terms of negative order does that the output does not show."""
+    what = "the integral of the terms of negative order"
+    if plan.integrator:
+        what += (
+            " winds up while the output is at a limit: an error of the other sign takes up to as long to undo"
+        )
+        remedy = "reset to the output that stands when the error turns"
+        return f"{plan.name} [transfer]: {what} it as the one before has lasted; {remedy}"
+    what += " starts at 0 and follows nothing: reset and track ignore the output that they are given"
+    remedy = "for a start without a bump set integrator = true and multiply the transfer function by s"
+    return f"{plan.name} [transfer]: {what}; {remedy}"
 
 
 def _adding_up(plan: Plan) -> list[str]:
