@@ -152,8 +152,8 @@ def _parameters(plan: Plan) -> list[Member]:
     if counts_limits(plan):
         state = present(plan.integrator).state
         found += [
-            Member(state.ctype, "low", f"the lower one{_counts(state)}"),
-            Member(state.ctype, "high", f"the upper one{_counts(state)}"),
+            Member(state.ctype, "low", f"lower limit of the output{_counts(state)}"),
+            Member(state.ctype, "high", f"upper limit of the output{_counts(state)}"),
         ]
     if plan.schedule:
         about = "from each breakpoint to the next"

@@ -36,9 +36,9 @@
 #endif
 
 /* Numerator: 0.4 s^0.6 + 1.
-   Here is lag 0 of each term c s^b, c h^-b times as many backward differences as b rounded up, h = 0.01
-   s; the modes below remember the rest. The weight of lag j is their sum over 4.15479, the denominator's
-   weight of lag 0. Oldest first, lags 1 ... 0. */
+   Here is lag 0 of each term c s^b, c h^-b (1 - 1/z)^n with n = b rounded up, h = 0.01 s; the modes below
+   remember the rest. The weight of lag j is their sum over 4.15479, the denominator's weight of lag 0.
+   Oldest first, lags 1 ... 0. */
 static const FOC_ROM int32_t finger_q31_numerator[2] = {
     /* lag 1: counts of 2^-30 */
     -1638366752,
@@ -72,9 +72,9 @@ static const FOC_ROM foc_mode_q31 finger_q31_numerator_modes[11] = {
 };
 
 /* What 1/s integrates: numerator terms of negative order times s: 0.5 s^0.6.
-   Here is lag 0 of each term c s^b, c h^-b times as many backward differences as b rounded up, h = 0.01
-   s; the modes below remember the rest. The weight of lag j is their sum times h/2 over 4.15479, the
-   denominator's weight of lag 0. Oldest first, lags 1 ... 0. */
+   Here is lag 0 of each term c s^b, c h^-b (1 - 1/z)^n with n = b rounded up, h = 0.01 s; the modes below
+   remember the rest. The weight of lag j is their sum times h/2 over 4.15479, the denominator's weight of
+   lag 0. Oldest first, lags 1 ... 0. */
 static const FOC_ROM int32_t finger_q31_integrand[2] = {
     /* lag 1: counts of 2^-37 */
     -1310693402,
@@ -108,9 +108,9 @@ static const FOC_ROM foc_mode_q31 finger_q31_integrand_modes[11] = {
 };
 
 /* Denominator: 0.05 s^0.9 + 1.
-   Here is lag 0 of each term c s^b, c h^-b times as many backward differences as b rounded up, h = 0.01
-   s; the modes below remember the rest. The weight of lag j is their sum over 4.15479, the denominator's
-   weight of lag 0. Oldest first, lag 1 only. */
+   Here is lag 0 of each term c s^b, c h^-b (1 - 1/z)^n with n = b rounded up, h = 0.01 s; the modes below
+   remember the rest. The weight of lag j is their sum over 4.15479, the denominator's weight of lag 0.
+   Oldest first, lag 1 only. */
 static const FOC_ROM int32_t finger_q31_denominator[1] = {
     /* lag 1: counts of 2^-31 */
     -1630613880,
