@@ -172,12 +172,14 @@ def test_the_open_loop_ramp_of_short_memory_is_said_and_is_there():
 
 
 def test_what_negative_orders_cost_is_said():
-    """That the bound is the clamp, until when it is better, and what the trapezoid is off by."""
+    """That a reset starts it at 0, that the bound is the clamp, until when it is better, and what the
+    trapezoid is off by."""
     given = dict(memory="exponential", operator="continuous", tolerance=0.02)
     plan = build_plan(simple(NEGATIVE), "f32", **given)
-    clamp, trapezoid = remarks(plan)
+    start, clamp, trapezoid = remarks(plan)
+    assert "starts at 0" in start
     samples, bound = int(re.search(r"within (\d+) samples", clamp)[1]), plan.error_bound
     assert samples * bound.operator_per_sample <= 0.01 * bound.operator
     half = 0.05 * np.pi
     assert f"{100 * (1 - half / np.tan(half)):.2g} % low" in trapezoid
-    assert len(remarks(build_plan(simple(NEGATIVE), "f32", band=(0.01, 1.0), **given))) == 1
+    assert len(remarks(build_plan(simple(NEGATIVE), "f32", band=(0.01, 1.0), **given))) == 2
