@@ -158,9 +158,13 @@ def _text(made: Generated) -> str:
 
 
 def _least(made: Generated) -> list[str]:
-    """What the integral acts on, and what it cannot hold."""
+    """From which error on the integral always moves, and what it cannot hold."""
     least, unit = made.manifest.get("smallest_error"), made.plan.controller.units.measurement
-    found = [] if least is None else [f"the integral acts on errors down to {least:.3g} {unit}".rstrip()]
+    found = (
+        []
+        if least is None
+        else [f"a steady error always moves the integral from {least:.3g} {unit}".rstrip() + " on"]
+    )
     return found + [f"note: {remark}" for remark in made.manifest.get("remarks", [])]
 
 

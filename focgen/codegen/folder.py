@@ -15,7 +15,7 @@ from focgen.codegen.manifest import sizes
 from focgen.codegen.texts import UserText, markdown
 from focgen.plan.canonical import memory_bias
 from focgen.plan.formats import runtime
-from focgen.plan.integrals import smallest_error
+from focgen.plan.least_error import since_reset, smallest_error
 from focgen.plan.plan import Plan
 from focgen.plan.remarks import remarks
 from focgen.present import present
@@ -58,6 +58,7 @@ class ReadmeContext:
     signals: list[Signal]
     scheduled: bool
     integral: bool
+    inner: bool
     state_bytes: int
     table_bytes: int
     multiplies: int
@@ -66,6 +67,7 @@ class ReadmeContext:
     operator: UserText
     output_per_sample: UserText
     smallest: UserText | None
+    since_reset: bool
     remarks: list[UserText]
     truncation: UserText | None
     biases: list[str]
@@ -104,6 +106,7 @@ def readme_context(
         signals=_signals(plan),
         scheduled=plan.schedule is not None,
         integral=plan.integrator is not None,
+        inner=plan.inner is not None,
         state_bytes=size["state_bytes"],
         table_bytes=size["table_bytes"],
         multiplies=plan.multiplies,
@@ -112,6 +115,7 @@ def readme_context(
         operator=_quantity(bound.operator, operator_unit),
         output_per_sample=_quantity(bound.output_per_sample, unit),
         smallest=None if least is None else _quantity(least, plan.controller.units.measurement),
+        since_reset=since_reset(plan),
         remarks=[UserText(remark) for remark in remarks(plan)],
         truncation=None if bound.truncation is None else _quantity(bound.truncation, operator_unit),
         biases=_biases(plan),

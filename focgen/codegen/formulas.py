@@ -33,9 +33,9 @@ def step_formulas(plan: Plan) -> list[str]:
         lag = f"y = y + (1 - exp(-h/T)) (ref - y), T = {plan.controller.setpoint_filter:.6g} s"
         lines = [lag, "e = y - meas"]
     if plan.inner:
-        lines.append(f"z = 1/s ({polynomial_text(form.rest)}) e, a trapezoid, clamped")
+        lines.append(f"z = 1/s {_of_error(form.rest)}, a trapezoid, clamped")
     if plan.direct:
-        terms.append(f"({polynomial_text(form.direct)}) e")
+        terms.append(_of_error(form.direct))
     if plan.inner:
         terms.append("z")
     p, den = " + ".join(terms), polynomial_text(form.den)
@@ -52,8 +52,20 @@ def _output_formulas(plan: Plan) -> list[str]:
         slew = plan.controller.slew_limit
         held = "" if slew is None else f", by at most {f'{slew:.6g} {unit}'.rstrip()} a second"
         found = f"u = u + d + d of the sample before (trapezoid){held}, {clamp}"
-        return [f"d = {_gain_text(plan)} v h/2", found]
-    return [f"u = {_gain_text(plan)} v, {clamp}"]
+        return [f"d = {_times_gain(plan)}v h/2", found]
+    return [f"u = {_times_gain(plan)}v, {clamp}"]
+
+
+def _times_gain(plan: Plan) -> str:
+    """The gain as a factor; nothing where it is 1."""
+    gain = _gain_text(plan)
+    return "" if gain == "1" else f"{gain} "
+
+
+def _of_error(terms: Polynomial) -> str:
+    """A polynomial times e."""
+    text = polynomial_text(terms)
+    return "e" if text == "1" else f"({text}) e"
 
 
 def weights_about(plan: Plan, terms: Polynomial, table: Sum, what: str, half_step: bool = False) -> list[str]:
@@ -71,7 +83,7 @@ def weights_about(plan: Plan, terms: Polynomial, table: Sum, what: str, half_ste
     if table.banks:
         led = f", times {_leads(plan)}" if plan.band else ""
         formula = (
-            "Here is lag 0 of each term c s^b, c h^-b times as many backward differences as b rounded up"
+            "Here is lag 0 of each term c s^b, c h^-b (1 - 1/z)^n with n = b rounded up"
             f"{led}, h = {quantity(plan.sample_time, 's')}; the modes below remember the rest."
             f" The weight of lag j is their sum{factor}. Oldest first, {lags}."
         )

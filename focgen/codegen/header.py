@@ -14,7 +14,7 @@ from focgen.codegen.manifest import flags
 from focgen.codegen.saved import saved_bytes
 from focgen.codegen.state import Member, members, state_bytes
 from focgen.codegen.texts import UserText, comment
-from focgen.plan.plan import Format, Plan
+from focgen.plan.plan import Count, Format, Plan
 from focgen.present import present
 
 
@@ -47,6 +47,7 @@ class HeaderContext:
     members: tuple[Member, ...]
     state_bytes: int
     integral: bool
+    inner: bool
     scheduled: bool
     counted: Counted | None
     conversions: list[Conversion]
@@ -78,6 +79,7 @@ def header_context(
         members=members(plan, kernels),
         state_bytes=state_bytes(plan, kernels),
         integral=plan.integrator is not None,
+        inner=plan.inner is not None,
         scheduled=plan.schedule is not None,
         counted=None if plan.floating else counted(plan.output),
         conversions=conversions(plan) if floats else [],
@@ -145,9 +147,15 @@ def _limits(plan: Plan) -> list[Define]:
 
 def _ends(name: str, form: Format, physical: tuple[float, float], unit: str) -> list[Define]:
     return [
-        Define(f"{name}_{end}", constant(count, form.ctype), quantity(value, unit))
+        Define(f"{name}_{end}", constant(count, form.ctype), _end_about(form, count, value, unit))
         for end, count, value in (("MIN", form.low, physical[0]), ("MAX", form.high, physical[1]))
     ]
+
+
+def _end_about(form: Format, count: Count, value: float, unit: str) -> str:
+    """The value that was asked for, and whether a count only comes near it."""
+    exact = form.floating or count * form.lsb == value
+    return quantity(value, unit) if exact else f"the count nearest to {quantity(value, unit)}"
 
 
 def _tunable(plan: Plan) -> list[Define]:
@@ -159,7 +167,7 @@ def _tunable(plan: Plan) -> list[Define]:
     about = "factors: one for each gain of the schedule" if plan.schedule else "factors: one for the gain"
     ends = _ends("GAIN", box.factor, physical.gain, "")
     lowest, highest = (
-        Define(f"U_{name}", constant(end, plan.output.ctype), quantity(value, unit))
+        Define(f"U_{name}", constant(end, plan.output.ctype), _end_about(plan.output, end, value, unit))
         for name, end, value in (
             ("MIN_HIGHEST", box.low[1], physical.output_low[1]),
             ("MAX_LOWEST", box.high[0], physical.output_high[0]),

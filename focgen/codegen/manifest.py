@@ -15,7 +15,7 @@ from focgen.errors import InputError
 from focgen.fractional.elementary import rounded_up
 from focgen.jsontext import read_json
 from focgen.plan.canonical import memory_bias
-from focgen.plan.integrals import smallest_error
+from focgen.plan.least_error import smallest_error
 from focgen.plan.plan import (
     FLAG_HIGH,
     FLAG_INPUT,
@@ -164,7 +164,7 @@ def _exponential(plan: Plan) -> dict[str, Any]:
 
 
 def _least(plan: Plan) -> dict[str, Any]:
-    """The least steady error that the integral acts on, physical, and what it cannot hold."""
+    """The steady error, physical, from which on the integral always moves, and what it cannot hold."""
     least, said = smallest_error(plan), remarks(plan)
     return {
         **({} if least is None else {"smallest_error": rounded_up(least)}),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from focgen.codegen.literals import constant, literal
+from focgen.codegen.literals import constant, exponent, literal
 from focgen.plan.plan import Plan
 from focgen.plan.setpoint import start_of
 
@@ -22,6 +22,7 @@ class SetPointText:
     low: str
     high: str
     drop: str
+    drop_about: str
     start: str
     error: str
 
@@ -42,6 +43,7 @@ def set_point_text(plan: Plan) -> SetPointText | None:
         low=constant(made.low, kind),
         high=constant(made.high, kind),
         drop=constant(made.drop, kind),
+        drop_about=f"2^{exponent(made.drop)}" if made.drop else "",
         start=literal(start_of(plan), signal),
         error=f"(int16_t)({error})" if signal == "int16_t" else error,
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from focgen.codegen.banks import means, rests, state_about
 from focgen.codegen.kernels import PORTABLE, Kernels, named_sums
 from focgen.codegen.literals import scale
-from focgen.plan.plan import Format, Plan, Sum
+from focgen.plan.plan import Block, Format, Plan, Sum
 from focgen.present import present
 
 _SIZES = {"uint8_t": 1, "int16_t": 2, "uint16_t": 2, "int32_t": 4, "float": 4, "int64_t": 8, "double": 8}
@@ -152,8 +152,8 @@ def _parameters(plan: Plan) -> list[Member]:
     if counts_limits(plan):
         state = present(plan.integrator).state
         found += [
-            Member(state.ctype, "low", f"the lower one{_counts(state)}"),
-            Member(state.ctype, "high", f"the upper one{_counts(state)}"),
+            Member(state.ctype, "low", f"lower limit of the output{_counts(state)}"),
+            Member(state.ctype, "high", f"upper limit of the output{_counts(state)}"),
         ]
     if plan.schedule:
         about = "from each breakpoint to the next"
@@ -211,9 +211,16 @@ def state_bytes(plan: Plan, kernels: Kernels = PORTABLE) -> int:
     return -(-total // widest) * widest
 
 
+def printed_blocks(table: Sum) -> list[Block]:
+    """The blocks that the plain form prints: those with a weight other than 0, or one where there is none."""
+    return [block for block in table.blocks if any(block.weights)] or list(table.blocks[:1])
+
+
 def plain_bytes(plan: Plan, table: Sum) -> int:
-    """Bytes of a sum's tables in the plain form."""
-    return table.taps * size_of(plan.error.ctype) + (0 if plan.floating else 6 * len(table.blocks))
+    """Bytes of a sum's tables in the plain form; a block that is alone needs no table of blocks."""
+    blocks = printed_blocks(table)
+    weights = sum(len(block.weights) for block in blocks) * size_of(plan.error.ctype)
+    return weights + 6 * len(blocks) * (len(blocks) > 1)
 
 
 def size_of(ctype: str) -> int:

@@ -9,7 +9,7 @@ from focgen.codegen.banks import BankText, bank_texts, inputs, ring_of
 from focgen.codegen.expressions import bound, shifted
 from focgen.codegen.literals import exponent, quantity, rows, scale, wrapped
 from focgen.codegen.lookahead import LookAhead, Run
-from focgen.codegen.state import plain_bytes, size_of
+from focgen.codegen.state import plain_bytes, printed_blocks, size_of
 from focgen.codegen.texts import comment
 from focgen.plan.formats import runtime
 from focgen.plan.plan import Block, Plan, Sum
@@ -78,7 +78,7 @@ def sum_text(
     """
     if ahead is not None:
         return _ahead_text(plan, table, f"{plan.name}_{name}", about, ahead)
-    blocks = [block for block in table.blocks if any(block.weights)] or list(table.blocks[:1])
+    blocks = printed_blocks(table)
     weights = f"{plan.name}_{name}"
     made = [_weights(plan, blocks, weights, about)]
     if len(blocks) > 1:

@@ -10,7 +10,7 @@ import numpy as np
 from focgen.arrays import Array
 from focgen.control.controller import Controller
 from focgen.loop.online import OnlineConvolution
-from focgen.plan.canonical import Table, Tables, inner_limits, tables
+from focgen.plan.canonical import Table, Tables, inner_limits, realise, tables
 from focgen.plan.setpoint import rate_of
 
 
@@ -42,7 +42,9 @@ class FloatStepper:
         reference: float = 0.0,
     ) -> None:
         memory = samples if length is None else min(length, samples)
-        self._sums = _Sums(tables(controller, max(1, memory)), columns, samples, inner_limits(controller))
+        parts = tables(controller, max(1, memory))
+        limits = inner_limits(controller, _at_rest(controller, parts, length))
+        self._sums = _Sums(parts, columns, samples, limits)
         self._gain = gain or controller.gain_at
         self._limits = controller.ranges.output
         self._half = 0.5 * controller.sample_time if controller.integrator else None
@@ -68,6 +70,13 @@ class FloatStepper:
         return self._integral
 
 
+def _at_rest(controller: Controller, parts: Tables, length: int | None) -> float:
+    """A(1) of a memory of ``length`` (None: infinite), also where a run is shorter."""
+    if length is None:
+        return realise(controller).constant / parts.normaliser
+    return tables(controller, max(1, length)).at_rest
+
+
 class _Sums:
     """The transfer function: direct and inner sums of the error, and the recursion of the filtered signal."""
 
@@ -79,9 +88,7 @@ class _Sums:
 
         self._direct, self._rest = convolution(parts.direct), convolution(parts.rest)
         self._feedback = convolution(parts.feedback)
-        self._low, self._high = sorted(
-            limit / parts.normaliser for limit in limits
-        )  # the tables are divided by it
+        self._low, self._high = limits
         self._inner, self._previous = np.zeros(columns), np.zeros(columns)
 
     def step(self, error: Array) -> Array:

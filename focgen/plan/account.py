@@ -78,8 +78,8 @@ class Account(ABC):
         """The rounding in a sum over a history within ``span``."""
 
     @abstractmethod
-    def inner_edge(self) -> float:
-        """Of a limit of the inner integral."""
+    def inner_given(self) -> float:
+        """Of what the inner integral gives, beside the error of its own."""
 
     @abstractmethod
     def inner_rounding(self) -> float:
@@ -112,18 +112,13 @@ class Account(ABC):
         self.own = inverse_of(tables.feedback) if tables.feedback else None
         self.M = self.own.norm if self.own else 1.0
         self.N = self.norm_after(tables.direct)
-        clamp = [x / tables.normaliser for x in inner_limits(controller)] if tables.rest else [0.0]
-        self.Z, self.width = max(map(abs, clamp)), max(clamp) - min(clamp)
+        self.ends = inner_limits(controller, tables.at_rest) if tables.rest else (0.0, 0.0)
+        self.Z, self.width = max(map(abs, self.ends)), self.ends[1] - self.ends[0]
         self.clamp, self.early = self.Z, early and tables.rest is not None
         if self.early:
             self.Z = min(self.Z, 2.0 * present(tables.rest).l1 * self.E + self.inner_growth())
-        still = tables.direct.total / self.rest_of_recursion if tables.direct else 0.0
+        still = tables.direct.total / tables.at_rest if tables.direct else 0.0
         self.reach = self.machine_e.swing(self.N, still) + self.M * self.Z
-
-    @property
-    def rest_of_recursion(self) -> float:
-        """A(1)."""
-        return present(self.tables.feedback).total if self.tables.feedback else 1.0
 
     def norm_after(self, table: Table | None) -> float:
         """‖table/A‖₁."""
@@ -149,7 +144,7 @@ class Account(ABC):
         held, wanted = np.array(_mode_weights(made)), np.array(_exact_weights(present(table)))
         answers = np.array([2.0 + 2.0 * q * (b.differences - 1) for b in made.banks for q in b.real_rates])
         modes = exact_sum(answers * (np.abs(held - wanted) + 16.0 * _DOUBLE * np.abs(wanted)))
-        after, still = (self.M, self.rest_of_recursion) if inverted else (1.0, 1.0)
+        after, still = (self.M, self.tables.at_rest) if inverted else (1.0, 1.0)
         taps = min(self.own.norm_after(off), after * l1(off)) if self.own and inverted else l1(off)
         known = span.swing(taps, exact_sum(off) / still)
         return known + after * (uncertain * span.largest + modes * span.radius)
@@ -169,11 +164,26 @@ class Account(ABC):
         each += self.sum_error(made.rest, table, self.machine_e)
         return 2.0 * each + self.inner_rounding()
 
+    def inner_edge(self) -> float:
+        """Of a limit of the inner integral, by the quantised weights behind it and its own rounding; early,
+        of as much of the clamp as there is."""
+        state = present(self.plan.inner).state
+        off = max(abs(held * state.lsb - x) for held, x in zip((state.low, state.high), self.ends))
+        part = self.Z / self.clamp if self.clamp else 0.0
+        return (off + (4.0 * _DOUBLE + self.rest_uncertain()) * self.clamp) * part
+
+    def rest_uncertain(self) -> float:
+        """A(1), relative, by the double's weights that it is a sum of."""
+        table = self.tables.feedback
+        if table is None:
+            return 0.0
+        return exact_sum(self.recursion(np.arange(len(table.size))) * table.size) / self.tables.at_rest
+
     def inner(self) -> FilteredError:
         """The inner integral alone, as if it were all there is of v."""
         if self.plan.inner is None:
             return FilteredError({})
-        edge = self.inner_edge()
+        edge = self.inner_edge() + self.inner_given()
         growth = self.inner_growth()
         return FilteredError({"inner": edge}, self.M * growth, self.M * (self.width + edge))
 

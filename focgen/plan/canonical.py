@@ -22,7 +22,8 @@ of two samples.
 
 The integral of a term of negative order is clamped like that of an ordinary PID controller: to what takes the
 output, alone and at rest, from one of its limits to the other at the smallest gain that occurs. Ahead of an
-integrator it is clamped to what would take the output across its whole range in one sample.
+integrator it is clamped to what would take the output across its whole range in one sample. At rest means by
+the denominator that runs: a short memory adds its bias to it, and quantised weights add their rounding.
 """
 
 from __future__ import annotations
@@ -109,6 +110,11 @@ class Tables:
     rest: Table | None
     feedback: Table | None
     normaliser: float
+
+    @property
+    def at_rest(self) -> float:
+        """A(1): what the denominator makes of a constant 1, positive where the recursion is stable."""
+        return self.feedback.total if self.feedback else 1.0
 
 
 def realise(controller: Controller) -> Realisation:
@@ -230,10 +236,11 @@ def memory_bias(controller: Controller, length: int) -> tuple[tuple[float, float
     )
 
 
-def inner_limits(controller: Controller) -> tuple[float, float]:
-    """The clamp of the integral of the terms of negative order, in units of ``Realisation.den``'s output.
+def inner_limits(controller: Controller, at_rest: float) -> tuple[float, float]:
+    """The clamp of the integral of the terms of negative order, in units of the denominator's output.
 
-    At rest the output is gain · z / (the denominator's constant); see the module's description.
+    ``at_rest``: what that denominator makes of a constant 1. At rest the output is gain · z / at_rest; see
+    the module's description.
     """
     gains = controller.gains
     smallest = min((abs(g) for g in gains if g != 0.0), default=1.0) * controller.factors[0]
@@ -241,8 +248,7 @@ def inner_limits(controller: Controller) -> tuple[float, float]:
     if controller.integrator:
         reach = (high - low) / controller.sample_time
         low, high = -reach, reach
-    constant = realise(controller).constant
-    largest = [x * constant / (g * smallest) for x in (low, high) for g in _signs(gains)]
+    largest = [x * at_rest / (g * smallest) for x in (low, high) for g in _signs(gains)]
     return min([*largest, 0.0]), max([*largest, 0.0])
 
 

@@ -64,9 +64,8 @@ def signals(controller: Controller, word: Word) -> Signals:
     """Formats of the inputs, whose difference must fit as well, and of the output."""
     where, ranges, unit = f"{controller.name} [ranges]", controller.ranges, controller.units.measurement
     (r0, r1), (m0, m1) = ranges.reference, ranges.measurement
-    exponent = exponent_for(
-        max(map(abs, (r0, r1, m0, m1))), word.limit, where, "the reference or measurement"
-    )
+    most = word.limit - 1  # one count is left for what is out of range, above as below
+    exponent = exponent_for(max(map(abs, (r0, r1, m0, m1))), most, where, "the reference or measurement")
     while True:
         ref = span_of(r0, r1, exponent, where, "reference")
         meas = Interval(0, 0) if (m0, m1) == NOTHING else span_of(m0, m1, exponent, where, "measurement")
@@ -75,7 +74,7 @@ def signals(controller: Controller, word: Word) -> Signals:
             break
         exponent += 1
     low, high = ranges.output
-    output = exponent_for(max(abs(low), abs(high)), word.limit, where, "the output")
+    output = exponent_for(max(abs(low), abs(high)), most, where, "the output")
     r, y, e = (_format(word.bits, exponent, x, unit) for x in (ref, meas, error))
     u = _format(word.bits, output, span_of(low, high, output, where, "output"), controller.units.output)
     return Signals(r, y, e, exponent, u, output)
@@ -93,10 +92,12 @@ def filter_of(controller: Controller, tables: Tables, inputs: Signals, word: Wor
     fit."""
     sample = _Sample(inputs.exponent, span(inputs.error), word, f"{controller.name} [transfer]")
     direct = sample.parts(tables.direct, 0) if tables.direct else None
-    inner = _inner(controller, tables, sample) if tables.rest else None
-    if tables.feedback is None:
+    back = _past(word, 0, sample.where).parts(tables.feedback, 1) if tables.feedback else None
+    at_rest = back.at_rest if back else 1.0
+    inner = _inner(inner_limits(controller, at_rest), tables.rest, sample) if tables.rest else None
+    if back is None:
         return _without_feedback(direct, inner, sample)
-    return _with_feedback(direct, inner, sample, controller, tables)
+    return _with_feedback(direct, inner, back, sample, controller)
 
 
 @dataclass(frozen=True)
@@ -138,17 +139,26 @@ class _Parts:
         return max([coarsest(self.taps)] + [b.exponent + b.guard for b in self.banks])
 
     @property
+    def at_rest(self) -> float:
+        """What the denominator makes of a constant 1, where these are its weights from lag 1 on; modes add
+        nothing."""
+        return 1.0 + math.fsum(float(c) * 2.0**d.exponent for d in self.taps for c in d.counts)
+
+    @property
     def response(self) -> Response:
         """The quantised weights by lag from 0 on."""
         taps = np.concatenate([d.counts * 2.0**d.exponent for d in self.taps])
         return response_of(taps, self.taps[0].first, [b.modes for b in self.banks])
 
 
-def _inner(controller: Controller, tables: Tables, sample: _Sample) -> InnerIntegrator:
-    """The clamped integral; ``to_wide`` is filled in once the wide format is known."""
-    parts = sample.parts(present(tables.rest), 0)
-    low, high = (x / tables.normaliser for x in inner_limits(controller))
-    low, high = min(low, high), max(low, high)
+def _past(word: Word, exponent: int, where: str) -> _Sample:
+    """Of v, which may be anywhere in its type."""
+    return _Sample(exponent, Interval(-word.limit - 1, word.limit), word, where)
+
+
+def _inner(limits: tuple[float, float], table: Table, sample: _Sample) -> InnerIntegrator:
+    """The integral, clamped to ``limits``; ``to_wide`` is filled in once the wide format is known."""
+    parts, (low, high) = sample.parts(table, 0), limits
     exponent = sample.exponent + parts.coarsest
     while True:
         rest = sample.sum("rest", "error", parts, exponent)
@@ -202,13 +212,11 @@ def _without_feedback(direct: _Parts | None, inner: InnerIntegrator | None, samp
 def _with_feedback(
     direct: _Parts | None,
     inner: InnerIntegrator | None,
+    back: _Parts,
     sample: _Sample,
     controller: Controller,
-    tables: Tables,
 ) -> Filter:
     word = sample.word
-    whole = Interval(-word.limit - 1, word.limit)
-    back = _Sample(0, whole, word, sample.where).parts(present(tables.feedback), 1)
     own = _quantised_inverse(back, controller, word)
     b = direct.response if direct else Response(np.zeros(1))
     reach = own.norm_after(b.weights, b.left_out) * sample.each.worst * 2.0**sample.exponent
@@ -248,8 +256,7 @@ def _recursion(
 ) -> Filter | None:
     """The filter with v in counts of 2^``exponent``; None where the wide format cannot be finer than v."""
     word = sample.word
-    whole = Interval(-word.limit - 1, word.limit)
-    past = _Sample(exponent, whole, word, sample.where)
+    past = _past(word, exponent, sample.where)
     wide = max(_floor(direct, inner, sample), exponent + back.coarsest)
     while wide <= exponent:
         made, placed, p = _combined(direct, inner, sample, wide)
@@ -259,7 +266,7 @@ def _recursion(
         x = p - span(table.total) + Interval(-half, half)
         if max(x.worst, p.worst, span(table.total).worst) + half <= limit(word.sum_bits):
             steady, by = _steady(made, table, sample, exponent, word)
-            v = _format(word.bits, exponent, whole)
+            v = _format(word.bits, exponent, past.each)
             return Filter(
                 made,
                 placed,

@@ -31,9 +31,9 @@ class Fixed(Account):
         aligned = sum(bool(b.align) for b in made.blocks) + sum(bool(b.align) for b in made.banks)
         return (0.5 * aligned + drive_error(made)) * made.total.lsb
 
-    def inner_edge(self) -> float:
-        """Half a count."""
-        return 0.5 * present(self.plan.inner).state.lsb
+    def inner_given(self) -> float:
+        """Nothing: its alignment is counted with the others."""
+        return 0.0
 
     def inner_rounding(self) -> float:
         """None: counts add up exactly."""

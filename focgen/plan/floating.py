@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -25,12 +26,13 @@ def filter_of(controller: Controller, tables: Tables, kind: type[np.floating[Any
     """The parts from e to v. Raises PlanError where a weight is beyond the type."""
     real = Format(ctype, 1.0, -np.inf, np.inf)
     direct = _sum("direct", "error", tables.direct, 0, controller, kind, real) if tables.direct else None
-    inner = _inner(controller, tables, kind, real) if tables.rest else None
-    feedback = None
+    feedback, at_rest = None, 1.0
     if tables.feedback:
         table = _sum("feedback", "filtered", tables.feedback, 1, controller, kind, real)
         total = tables.direct.total if tables.direct else 0.0
         feedback = Feedback(table, _rounded(total / tables.feedback.total, controller, kind), 0)
+        at_rest += math.fsum(table.values)
+    inner = _inner(controller, present(tables.rest), at_rest, kind, real) if tables.rest else None
     return Filter(direct, inner, real, 0, feedback, real, 0)
 
 
@@ -58,11 +60,11 @@ def _sum(
 
 
 def _inner(
-    controller: Controller, tables: Tables, kind: type[np.floating[Any]], real: Format
+    controller: Controller, table: Table, at_rest: float, kind: type[np.floating[Any]], real: Format
 ) -> InnerIntegrator:
-    ends = [_rounded(x / tables.normaliser, controller, kind) for x in inner_limits(controller)]
-    rest = _sum("rest", "error", present(tables.rest), 0, controller, kind, real)
-    return InnerIntegrator(rest, Format(real.ctype, 1.0, min(ends), max(ends)), 0)
+    low, high = (_rounded(x, controller, kind) for x in inner_limits(controller, at_rest))
+    rest = _sum("rest", "error", table, 0, controller, kind, real)
+    return InnerIntegrator(rest, Format(real.ctype, 1.0, low, high), 0)
 
 
 def actuation(controller: Controller, output: Format, kind: type[np.floating[Any]], ctype: str) -> Actuation:

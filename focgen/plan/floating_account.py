@@ -12,7 +12,7 @@ import numpy as np
 from focgen.arrays import Array
 from focgen.fractional.elementary import exact_sum, l1
 from focgen.plan.account import Account, FilteredError, Span
-from focgen.plan.canonical import Table, Tables, inner_limits
+from focgen.plan.canonical import Table, Tables
 from focgen.plan.gain_errors import Piece, floating_pieces
 from focgen.plan.plan import Bank, Plan, Sum
 from focgen.plan.rounding import gamma, half_place, half_places, taps_error
@@ -81,15 +81,9 @@ class Floating(Account):
         reference = exact_sum(c * there) + gamma(bank.modes + 2, _DOUBLE) * float(partial[-1])
         return here + 1.01 * reference + bank.modes * self.tiny, float(partial[-1])
 
-    def inner_edge(self) -> float:
-        """Of its clamp, and in counts of what it gives: a float. Early, of as much of the clamp as there
-        is."""
-        state = present(self.plan.inner).state
-        wanted = sorted(x / self.tables.normaliser for x in inner_limits(self.plan.controller))
-        off = max(abs(held * state.lsb - x) for held, x in zip((state.low, state.high), wanted))
-        part = self.Z / self.clamp if self.clamp else 0.0
-        given = 0.0 if state.floating else self.last(self.Z)
-        return (off + 4.0 * _DOUBLE * self.clamp) * part + given
+    def inner_given(self) -> float:
+        """In counts: the float that is nearest."""
+        return 0.0 if present(self.plan.inner).state.floating else self.last(self.Z)
 
     def inner_rounding(self) -> float:
         """r + r_prev, z + that, each rounded, here and in the reference; in counts r alone, twice half a

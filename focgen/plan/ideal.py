@@ -161,7 +161,7 @@ class _Operator:
         self, form: Realisation, controller: Controller, count: int, memories: dict[float, Memory]
     ) -> None:
         h, parts = controller.sample_time, (form.direct, form.rest, form.den)
-        self.form, self.limits, self.half_step = form, inner_limits(controller), 0.5 * h
+        self.form, self.controller, self.half_step = form, controller, 0.5 * h
         self.setpoint_filter, self.span = controller.setpoint_filter, controller.ranges.reference
         self.direct, self.rest, self.den = (_Sum(terms, h, count, memories) for terms in parts)
 
@@ -207,7 +207,7 @@ class _Operator:
         """The clamped trapezoid, from 0."""
         still = sum(t.coefficient for t in self.form.rest if t.order == 0.0) if endless else self.rest.still
         r = np.concatenate([[0.0], self.rest(part)]) + still * constant
-        low, high = self.limits
+        low, high = inner_limits(self.controller, self.form.constant if endless else self.den.still)
         out, z = [], 0.0
         for increment in (self.half_step * (r[1:] + r[:-1])).tolist():
             z = min(max(z + increment, low), high)

@@ -6,7 +6,8 @@ import math
 
 from focgen.fractional.weights import short_memory_bias
 from focgen.plan.canonical import realise
-from focgen.plan.integrals import STEPS, added_up, coarse, smallest_error
+from focgen.plan.integrals import STEPS, added_up
+from focgen.plan.least_error import coarse, out_of_reach, since_reset, smallest_error
 from focgen.plan.plan import Plan
 
 _SHARE = 0.01  # of what an integral can be off by in the end
@@ -19,7 +20,7 @@ def remarks(plan: Plan) -> list[str]:
     found = [*_held(plan), *_beside_whole(plan)]
     if plan.inner is None:
         return found
-    return [*found, *_adding_up(plan), *_ramp(plan), *_trapezoid(plan)]
+    return [*found, _beside_output(plan), *_adding_up(plan), *_ramp(plan), *_trapezoid(plan)]
 
 
 def _beside_whole(plan: Plan) -> list[str]:
@@ -39,13 +40,30 @@ def _held(plan: Plan) -> list[str]:
     found, added = [], added_up(plan)
     wider = {"q15": "choose q31 or f32", "q31": "choose f64"}.get(plan.arithmetic, "lengthen the sample time")
     if coarse(plan):
-        what = f"a steady error below {smallest_error(plan):.3g} never moves the integral"
+        what = f"a steady error below {smallest_error(plan):.3g} may be left: the integral need not move"
+        if out_of_reach(plan):
+            what = "no steady error within the ranges is sure to move the integral"
+        what += ", even after a reset to it" if since_reset(plan) else ""
         found.append(f"{plan.name} [gain]: {what}; raise the gain, or {wider}")
     if added is not None and added > 0.5:
         what = f"one increment can be so large that rounding adds up to {added:.2g} digits of the output"
         remedy = "narrow the input ranges, or choose q31 or f64"
         found.append(f"{plan.name} [ranges]: {what} in {STEPS:.0e} samples; {remedy}")
     return found
+
+
+def _beside_output(plan: Plan) -> str:
+    """What the integral of the terms of negative order does that the output does not show."""
+    what = "the integral of the terms of negative order"
+    if plan.integrator:
+        what += (
+            " winds up while the output is at a limit: an error of the other sign takes up to as long to undo"
+        )
+        remedy = "reset to the output that stands when the error turns"
+        return f"{plan.name} [transfer]: {what} it as the one before has lasted; {remedy}"
+    what += " starts at 0 and follows nothing: reset and track ignore the output that they are given"
+    remedy = "for a start without a bump set integrator = true and multiply the transfer function by s"
+    return f"{plan.name} [transfer]: {what}; {remedy}"
 
 
 def _adding_up(plan: Plan) -> list[str]:

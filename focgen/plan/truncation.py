@@ -38,12 +38,28 @@ def truncation(plan: Plan, tables: Tables, past_horizon: bool = True) -> float |
     e, gain = largest_error(plan.controller), largest_gain(plan.controller)
     direct = _left_out(plan, form.direct, past_horizon) / scale
     rest = 0.5 * h * _left_out(plan, form.rest, past_horizon) / scale
-    clamp = [x / tables.normaliser for x in inner_limits(plan.controller)] if form.rest else [0.0]
-    drift = (max(clamp) - min(clamp)) if rest else 0.0
+    back = _left_out(plan, form.den, past_horizon) / scale if tables.feedback else 0.0
+    clamp, endless = _clamps(plan, tables, form, bool(back))
+    drift = max(clamp[1] - endless[0], endless[1] - clamp[0]) if rest else _apart(clamp, endless)
     if tables.feedback is None:
         return gain * (direct * e + drift) * _SLACK
-    back = _left_out(plan, form.den, past_horizon) / scale
     return _recursive_truncation(plan, tables, form, (direct, back), drift, max(map(abs, clamp)))
+
+
+def _clamps(
+    plan: Plan, tables: Tables, form: Realisation, differ: bool
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """The clamp of the inner integral, and with infinite memory; they differ where den's memory does."""
+    if not form.rest:
+        return (0.0, 0.0), (0.0, 0.0)
+    clamp = inner_limits(plan.controller, tables.at_rest)
+    return clamp, inner_limits(plan.controller, form.constant / tables.normaliser) if differ else clamp
+
+
+def _apart(one: tuple[float, float], other: tuple[float, float]) -> float:
+    """How far two integrals of the same can be apart, one clamped here, one there: as far as their ends are,
+    since the middle of three numbers moves no further than the farthest of them."""
+    return max(abs(a - b) for a, b in zip(one, other))
 
 
 def _left_out(plan: Plan, terms: Polynomial, past_horizon: bool) -> float:

@@ -109,7 +109,7 @@ def fixed_tuning(controller: Controller, gains: tuple[float, ...], word: Word) -
     where, (low, high) = f"{controller.name} [tunable]", controller.factors
     largest = max(map(abs, gains))
     fine = exponent_for(largest, word.limit, where, "the gain")
-    finer = exponent_for(high, word.limit, where, "the factor")
+    finer = exponent_for(high, word.limit - 1, where, "the factor")  # a count for what is out of the box
     coarse = exponent_for(largest * high, word.limit - margin(word), where, "the tuned gain")
     least, most = (nearest(end * 2.0**-finer) for end in (low, high))
     if least < 1:

@@ -87,11 +87,24 @@ class Walk:
         own += sum(16 * (2.0 + 2.0 * q * (m - 1)) * abs(c) for m, q, c in exact.modes) * (high - low) / 2
         return known, norm * own * U64
 
+    def inner_end(self) -> float:
+        """The clamp as it is held, with the weights that run, of as much of it as is reached."""
+        state = self.plan.inner.state
+        off = max(abs(n * state.lsb - x) for n, x in zip((state.low, state.high), self.true.limits))
+        return (off + 4.0 * U64 * self.clamp) * (self.Z / self.clamp if self.clamp else 0.0)
+
+    def inner_loose(self) -> float:
+        """What doubles of the denominator's weights may cost the clamp, at most, there and here."""
+        if not self.true.den:
+            return 0.0
+        lags = np.arange(len(self.true.den.sizes))
+        return 2.0 * self.M * self.Z * U64 * float(((4 * lags + 20) * self.true.den.sizes).sum()) / self.A1
+
     def inner_step(self) -> float:
         """By how much the inner integral's error grows in a sample: r is added twice."""
         rest = self.plan.inner.rest
-        known, self.inner_loose = self.weights(rest, self.true.rest, self.low, self.high, after=False)
-        self.inner_loose *= 2.0
+        known, self.step_loose = self.weights(rest, self.true.rest, self.low, self.high, after=False)
+        self.step_loose *= 2.0
         each = known + self.true.rest.norm * self.off + self.sum(rest, self.true.rest, self.low, self.high)
         return 2.0 * each + self.inner_rounding()
 
@@ -102,7 +115,7 @@ class Walk:
         if self.plan.inner:
             width = self.true.limits[1] - self.true.limits[0]
             growth, ceiling = self.M * self.step, self.M * (width + self.edge())
-            loose["growth"] = self.M * self.inner_loose
+            loose["growth"] = self.M * self.step_loose
         reach, tried = self.reach + sum(static.values()), []
         for error, largest in self.pieces():
             parts = {cause: largest * value for cause, value in static.items()}
@@ -132,7 +145,7 @@ class Whole(Walk):
         return 0.0
 
     def edge(self) -> float:
-        return 0.5 * self.plan.inner.state.lsb
+        return self.inner_end()
 
     def static(self) -> tuple[dict[str, float], dict[str, float]]:
         plan, true = self.plan, self.true
@@ -156,7 +169,7 @@ class Whole(Walk):
             rounding += lsb * self.at_reset() * max(1.0, self.M * (1.0 + sum(back.values)))
         inner = self.M * self.edge() if plan.inner else 0.0
         static = {"inputs": self.N * self.off, "weights": weights, "inner": inner, "rounding": rounding}
-        return static, {"weights": loose}
+        return static, {"weights": loose, "inner": self.inner_loose() if plan.inner else 0.0}
 
     def output(self, first: float, operator: float) -> float:
         """Its own rounding, and a limit's or that of what it is set to; a slew limit's."""
@@ -303,11 +316,8 @@ class Real(Walk):
         return own + half_place(1.01 * r, self.u) + half_place(1.01 * (self.clamp + r), self.u)
 
     def edge(self) -> float:
-        """Its ends as they are held, of as much of the clamp as is reached."""
-        state = self.plan.inner.state
-        off = max(abs(n * state.lsb - x) for n, x in zip((state.low, state.high), self.true.limits))
-        share = self.Z / self.clamp if self.clamp else 0.0
-        return (off + 4.0 * U64 * self.clamp) * share + (0.0 if state.floating else self.last(self.Z))
+        """Its ends, and the float that a count becomes."""
+        return self.inner_end() + (0.0 if self.plan.inner.state.floating else self.last(self.Z))
 
     def static(self) -> tuple[dict[str, float], dict[str, float]]:
         plan, true = self.plan, self.true
@@ -324,7 +334,7 @@ class Real(Walk):
             known, own, rounding = self.recursive(weights + inner, rounding)
             weights, loose = weights + known, loose + own
         static = {"inputs": self.N * self.off, "weights": weights, "inner": inner, "rounding": rounding}
-        return static, {"weights": loose}
+        return static, {"weights": loose, "inner": self.inner_loose() if plan.inner else 0.0}
 
     def output(self, first: float, operator: float) -> float:
         """An addition here and in the reference; in counts what is taken in twice, and an output set."""

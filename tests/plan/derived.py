@@ -98,13 +98,13 @@ def _truth(plan: Plan, controller: Controller) -> Truth:
     scale = _weights(plan, den, h, one, one)[1]
     direct = [(c, o) for c, o in num if o >= 0]
     rest = [(c, whole(Decimal(float(o + 1)))) for c, o in num if o < 0]
-    constant = next(c for c, o in den if o == 0)
+    back = _weights(plan, den, h, scale, one)[0]
     return Truth(
         controller,
         _weights(plan, direct, h, scale, one)[0] if direct else None,
         _weights(plan, rest, h, scale, h / 2)[0] if rest else None,
-        _weights(plan, den, h, scale, one)[0] if len(den) > 1 else None,
-        _limits(controller, float(constant / scale)) if rest else (0.0, 0.0),
+        back if len(den) > 1 else None,
+        _limits(controller, back.total) if rest else (0.0, 0.0),
     )
 
 

@@ -87,7 +87,7 @@ class _Sum:
 def _filtered(plan: Plan, e: list[Decimal]) -> list[Decimal]:
     form, h = realise(plan.controller), Decimal(plan.sample_time)
     direct, rest, den = (_Sum(plan, terms) for terms in (form.direct, form.rest, form.den))
-    low, high = (Decimal(x) for x in inner_limits(plan.controller))
+    low, high = (Decimal(x) for x in inner_limits(plan.controller, float(sum(den.taps))))
     z = r_before = Decimal(0)
     found = []
     for x in e:

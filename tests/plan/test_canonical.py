@@ -133,12 +133,12 @@ def test_inner_limits_are_those_of_a_pid_controller():
     """The integral alone can take the output to either limit, at the smallest gain, and 0 is within."""
     ranges = ControllerRanges((0.0, 1.0), (0.0, 1.0), (2.0, 10.0), (0.0, 1.0))
     pid = TransferFunction([(3.0, 0.0), (1.0, -1.0)])
-    assert inner_limits(simple(pid, ranges=ranges, gain=4.0)) == (0.0, 2.5)
-    assert inner_limits(simple(pid, ranges=ranges, gain=-4.0)) == (-2.5, 0.0)
+    assert inner_limits(simple(pid, ranges=ranges, gain=4.0), 1.0) == (0.0, 2.5)
+    assert inner_limits(simple(pid, ranges=ranges, gain=-4.0), 1.0) == (-2.5, 0.0)
     schedule = GainSchedule((0.0, 1.0), (4.0, 8.0))
-    assert inner_limits(simple(pid, ranges=ranges, gain=schedule)) == (0.0, 2.5)
+    assert inner_limits(simple(pid, ranges=ranges, gain=schedule), 1.0) == (0.0, 2.5)
     behind_lag = TransferFunction([(1.0, -1.0)], [(1.0, 1.0), (5.0, 0.0)])
-    assert inner_limits(simple(behind_lag, ranges=ranges)) == (0.0, 50.0)
+    assert inner_limits(simple(behind_lag, ranges=ranges), 5.0) == (0.0, 50.0)
 
 
 # ------------------------------------------------------------------------------------------- stability

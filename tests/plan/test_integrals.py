@@ -1,4 +1,4 @@
-"""Integrals of f32 in whole counts: what they add up, and the least error that any arithmetic acts on.
+"""Integrals of f32 in whole counts: what they add up, and the error from which on any arithmetic acts.
 
 Red when an increment is lost, or acted on though it is said to be too small.
 """
@@ -21,7 +21,8 @@ from focgen.plan.build import build_plan
 from focgen.plan.counts import MOST, NOTHING, counts_of, values_of
 from focgen.plan.ending import endings
 from focgen.plan.execute import execute
-from focgen.plan.integrals import STEPS, added_up, smallest_error
+from focgen.plan.integrals import STEPS, added_up
+from focgen.plan.least_error import smallest_error
 from focgen.plan.plan import Format
 from focgen.plan.remarks import remarks
 from focgen.plan.scenario import Reset, Scenario, nearest_raw, to_raw
@@ -146,7 +147,7 @@ def test_the_smallest_error_is_acted_on_and_what_is_smaller_is_not(controller, a
 def test_what_cannot_be_held_is_said(tmp_path):
     """A gain that leaves no count of a small error; increments that dwarf the output."""
     slow = integral(1e-9, 2e-5)
-    assert "never moves the integral" in remarks(build_plan(slow, "f64"))[0]
+    assert "the integral need not move" in remarks(build_plan(slow, "f64"))[0]
     assert remarks(build_plan(integral(), "f32")) == []
     wild = integral(1e9, 1e-4)
     assert "rounding adds up" in remarks(build_plan(wild, "f32"))[0]
@@ -171,12 +172,14 @@ def test_the_open_loop_ramp_of_short_memory_is_said_and_is_there():
 
 
 def test_what_negative_orders_cost_is_said():
-    """That the bound is the clamp, until when it is better, and what the trapezoid is off by."""
+    """That a reset starts it at 0, that the bound is the clamp, until when it is better, and what the
+    trapezoid is off by."""
     given = dict(memory="exponential", operator="continuous", tolerance=0.02)
     plan = build_plan(simple(NEGATIVE), "f32", **given)
-    clamp, trapezoid = remarks(plan)
+    start, clamp, trapezoid = remarks(plan)
+    assert "starts at 0" in start
     samples, bound = int(re.search(r"within (\d+) samples", clamp)[1]), plan.error_bound
     assert samples * bound.operator_per_sample <= 0.01 * bound.operator
     half = 0.05 * np.pi
     assert f"{100 * (1 - half / np.tan(half)):.2g} % low" in trapezoid
-    assert len(remarks(build_plan(simple(NEGATIVE), "f32", band=(0.01, 1.0), **given))) == 1
+    assert len(remarks(build_plan(simple(NEGATIVE), "f32", band=(0.01, 1.0), **given))) == 2

@@ -18,7 +18,8 @@ from focgen.fractional.transfer import TransferFunction
 from focgen.plan.build import build_plan
 from focgen.plan.counts import MOST, NOTHING, counts_of, taken_in, up_of, values_of
 from focgen.plan.ending import endings
-from focgen.plan.integrals import added_up, coarse, smallest_error
+from focgen.plan.integrals import added_up
+from focgen.plan.least_error import coarse, smallest_error
 from focgen.plan.plan import Format, Plan
 from focgen.plan.remarks import remarks
 from focgen.plan.scenario import Reset, Scenario
@@ -140,10 +141,15 @@ def test_the_smallest_error_that_an_integrator_acts_on(arithmetic, transfer, den
 
 
 @pytest.mark.parametrize(("arithmetic", "gain"), [("q31", 1.0), ("f32", 1.0), ("f32", 1e-6)])
-def test_of_two_integrals_the_more_sensitive_one_is_told(arithmetic, gain):
+def test_of_two_integrals_the_inner_one_is_told(arithmetic, gain):
+    """It may cancel an error as long as it stands, and then the integrator does not move either."""
     both = integral(gain, transfer=TransferFunction([(1.0, 0.0), (0.01, -0.5)]), length=30)
     plan = build_plan(both, arithmetic)
-    assert smallest_error(plan) == pytest.approx(least_by_running(plan, "inner integral"), rel=1e-4)
+    least, seen = smallest_error(plan), least_by_running(plan, "inner")
+    if arithmetic == "f32":
+        assert least == pytest.approx(seen, rel=1e-4)
+    else:  # half a count may be lost in each of its blocks
+        assert seen <= least <= seen * (1.0 + 2.0 * len(plan.inner.rest.blocks))
 
 
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
@@ -202,7 +208,8 @@ def test_what_is_said_has_the_numbers_that_it_is_about():
         plan = build_plan(slow, arithmetic)
         if smallest_error(plan) is not None and coarse(plan):
             (said,) = remarks(plan)
-            assert f"below {smallest_error(plan):.3g} never" in said and wider in said
+            left = f"a steady error below {smallest_error(plan):.3g} may be left"
+            assert (left in said or "no steady error within the ranges" in said) and wider in said
     assert remarks(build_plan(slow, "f64")) and not remarks(build_plan(integral(1.0), "f64"))
     for gain in (1e3, 1e5, 1e6, 1e9):
         plan = build_plan(integral(gain), "f32")

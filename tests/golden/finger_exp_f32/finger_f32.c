@@ -48,9 +48,9 @@
 #endif
 
 /* Numerator: 0.4 s^0.6 + 1.
-   Here is lag 0 of each term c s^b, c h^-b times as many backward differences as b rounded up, h = 0.01
-   s; the modes below remember the rest. The weight of lag j is their sum over 4.15479, the denominator's
-   weight of lag 0. Oldest first, lags 1 ... 0. */
+   Here is lag 0 of each term c s^b, c h^-b (1 - 1/z)^n with n = b rounded up, h = 0.01 s; the modes below
+   remember the rest. The weight of lag j is their sum over 4.15479, the denominator's weight of lag 0.
+   Oldest first, lags 1 ... 0. */
 static const FOC_ROM float finger_f32_numerator[2] = {
     -1.52584791f,  1.76653421f,
 };
@@ -77,9 +77,9 @@ static const FOC_ROM foc_mode_f32 finger_f32_numerator_slow_modes[8] = {
 };
 
 /* What 1/s integrates: numerator terms of negative order times s: 0.5 s^0.6.
-   Here is lag 0 of each term c s^b, c h^-b times as many backward differences as b rounded up, h = 0.01
-   s; the modes below remember the rest. The weight of lag j is their sum times h/2 over 4.15479, the
-   denominator's weight of lag 0. Oldest first, lags 1 ... 0. */
+   Here is lag 0 of each term c s^b, c h^-b (1 - 1/z)^n with n = b rounded up, h = 0.01 s; the modes below
+   remember the rest. The weight of lag j is their sum times h/2 over 4.15479, the denominator's weight of
+   lag 0. Oldest first, lags 1 ... 0. */
 static const FOC_ROM float finger_f32_integrand[2] = {
     -0.00953654945f,  0.00953654945f,
 };
@@ -106,9 +106,9 @@ static const FOC_ROM foc_mode_f32 finger_f32_integrand_slow_modes[8] = {
 };
 
 /* Denominator: 0.05 s^0.9 + 1.
-   Here is lag 0 of each term c s^b, c h^-b times as many backward differences as b rounded up, h = 0.01
-   s; the modes below remember the rest. The weight of lag j is their sum over 4.15479, the denominator's
-   weight of lag 0. Oldest first, lag 1 only. */
+   Here is lag 0 of each term c s^b, c h^-b (1 - 1/z)^n with n = b rounded up, h = 0.01 s; the modes below
+   remember the rest. The weight of lag j is their sum over 4.15479, the denominator's weight of lag 0.
+   Oldest first, lag 1 only. */
 static const FOC_ROM float finger_f32_denominator[1] = {
     -0.759313762f,
 };
@@ -200,9 +200,9 @@ static float finger_f32_filter(finger_f32_state *s, float e)
     if (!foc_held(r)) {
         return foc_nothing_f32();
     }
-    /* |sum| <= 6197356608029196288 < 2^63 */
-    s->inner = foc_clamp64(s->inner + (r + s->inner_input), (-1585670589601808384),
-                           1585670589601808384);
+    /* |sum| <= 6197356470590242816 < 2^63 */
+    s->inner = foc_clamp64(s->inner + (r + s->inner_input), (-1585670452162854912),
+                           1585670452162854912);
     s->inner_input = r;
     x += foc_value_f32(s->inner, 4.3368086899420177e-19f);
 
@@ -333,7 +333,7 @@ finger_f32_sig finger_f32_step(finger_f32_state *s, finger_f32_sig ref, finger_f
     }
     if (!finger_f32_within(s) ||
         !foc_held(s->inner_input) ||
-        !(s->inner >= (-1585670589601808384) && s->inner <= 1585670589601808384)) {
+        !(s->inner >= (-1585670452162854912) && s->inner <= 1585670452162854912)) {
         return finger_f32_recover(s, ref - meas);
     }
 

@@ -36,9 +36,9 @@
 #endif
 
 /* Numerator: 0.4 s^0.6 + 1.
-   Here is lag 0 of each term c s^b, c h^-b times as many backward differences as b rounded up, h = 0.01
-   s; the modes below remember the rest. The weight of lag j is their sum over 4.15479, the denominator's
-   weight of lag 0. Oldest first, lags 1 ... 0. */
+   Here is lag 0 of each term c s^b, c h^-b (1 - 1/z)^n with n = b rounded up, h = 0.01 s; the modes below
+   remember the rest. The weight of lag j is their sum over 4.15479, the denominator's weight of lag 0.
+   Oldest first, lags 1 ... 0. */
 static const FOC_ROM int32_t finger_q31_numerator[2] = {
     /* lag 1: counts of 2^-30 */
     -1638366752,
@@ -72,9 +72,9 @@ static const FOC_ROM foc_mode_q31 finger_q31_numerator_modes[11] = {
 };
 
 /* What 1/s integrates: numerator terms of negative order times s: 0.5 s^0.6.
-   Here is lag 0 of each term c s^b, c h^-b times as many backward differences as b rounded up, h = 0.01
-   s; the modes below remember the rest. The weight of lag j is their sum times h/2 over 4.15479, the
-   denominator's weight of lag 0. Oldest first, lags 1 ... 0. */
+   Here is lag 0 of each term c s^b, c h^-b (1 - 1/z)^n with n = b rounded up, h = 0.01 s; the modes below
+   remember the rest. The weight of lag j is their sum times h/2 over 4.15479, the denominator's weight of
+   lag 0. Oldest first, lags 1 ... 0. */
 static const FOC_ROM int32_t finger_q31_integrand[2] = {
     /* lag 1: counts of 2^-37 */
     -1310693402,
@@ -108,9 +108,9 @@ static const FOC_ROM foc_mode_q31 finger_q31_integrand_modes[11] = {
 };
 
 /* Denominator: 0.05 s^0.9 + 1.
-   Here is lag 0 of each term c s^b, c h^-b times as many backward differences as b rounded up, h = 0.01
-   s; the modes below remember the rest. The weight of lag j is their sum over 4.15479, the denominator's
-   weight of lag 0. Oldest first, lag 1 only. */
+   Here is lag 0 of each term c s^b, c h^-b (1 - 1/z)^n with n = b rounded up, h = 0.01 s; the modes below
+   remember the rest. The weight of lag j is their sum over 4.15479, the denominator's weight of lag 0.
+   Oldest first, lag 1 only. */
 static const FOC_ROM int32_t finger_q31_denominator[1] = {
     /* lag 1: counts of 2^-31 */
     -1630613880,
@@ -206,14 +206,14 @@ static int32_t finger_q31_filter(finger_q31_state *s, int32_t e)
 
     /* The trapezoid: half a step of this sample and half a step of the one before. */
     r = finger_q31_integrand_sum(s);
-    /* |sum| <= 6353763467691738476 < 2^63 */
-    s->inner = foc_clamp64(s->inner + (r + s->inner_input), (-6342682138601380864),
-                           6342682138601380864);
+    /* |sum| <= 6353763471522092396 < 2^63 */
+    s->inner = foc_clamp64(s->inner + (r + s->inner_input), (-6342682142431734784),
+                           6342682142431734784);
     s->inner_input = r;
     x += foc_shift64(s->inner, 3);
 
     s->filtered_now = foc_ring_next(s->filtered_now, FINGER_Q31_FILTERED);
-    x = x - finger_q31_denominator_sum(s) + s->carry; /* |x| <= 5112190365919384461 < 2^63 */
+    x = x - finger_q31_denominator_sum(s) + s->carry; /* |x| <= 5112190366398178701 < 2^63 */
     rounded = foc_shift64(x, 31);
     s->carry = x - rounded * ((int64_t)1 << 31); /* the next sample takes up what rounding drops */
     v = foc_sat32(rounded);

@@ -134,9 +134,9 @@ static float finger_f32_filter(finger_f32_state *s, float e)
     if (!foc_held(r)) {
         return foc_nothing_f32();
     }
-    /* |sum| <= 6197356608029196288 < 2^63 */
-    s->inner = foc_clamp64(s->inner + (r + s->inner_input), (-1585670589601808384),
-                           1585670589601808384);
+    /* |sum| <= 6216345311279841280 < 2^63 */
+    s->inner = foc_clamp64(s->inner + (r + s->inner_input), (-1604659292852453376),
+                           1604659292852453376);
     s->inner_input = r;
     x += foc_value_f32(s->inner, 4.3368086899420177e-19f);
 
@@ -246,7 +246,7 @@ finger_f32_sig finger_f32_step(finger_f32_state *s, finger_f32_sig ref, finger_f
     }
     if (!finger_f32_within(s) ||
         !foc_held(s->inner_input) ||
-        !(s->inner >= (-1585670589601808384) && s->inner <= 1585670589601808384)) {
+        !(s->inner >= (-1604659292852453376) && s->inner <= 1604659292852453376)) {
         return finger_f32_recover(s, ref - meas);
     }
 

@@ -114,7 +114,7 @@ static inline float finger_f32_u_to_f32(finger_f32_sig u)
 }
 #endif
 
-/* The same by the names of before. */
+/* The same with the name as it is spelled, for programs that know them so. */
 #define finger_f32_SAMPLE_TIME   FINGER_F32_SAMPLE_TIME
 #define finger_f32_REF_LSB       FINGER_F32_REF_LSB
 #define finger_f32_SCHED_LSB     FINGER_F32_SCHED_LSB

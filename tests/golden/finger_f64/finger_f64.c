@@ -127,8 +127,8 @@ static double finger_f64_filter(finger_f64_state *s, double e)
 
     /* The trapezoid: half a step of this sample and half a step of the one before. */
     r = finger_f64_integrand_sum(s);
-    s->inner = foc_clamp_f64(s->inner + (r + s->inner_input), (-0.68767497540566225),
-                             0.68767497540566225);
+    s->inner = foc_clamp_f64(s->inner + (r + s->inner_input), (-0.6959100654760676),
+                             0.6959100654760676);
     s->inner_input = r;
     x += s->inner;
 

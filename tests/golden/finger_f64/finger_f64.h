@@ -114,7 +114,7 @@ static inline float finger_f64_u_to_f32(finger_f64_sig u)
 }
 #endif
 
-/* The same by the names of before. */
+/* The same with the name as it is spelled, for programs that know them so. */
 #define finger_f64_SAMPLE_TIME   FINGER_F64_SAMPLE_TIME
 #define finger_f64_REF_LSB       FINGER_F64_REF_LSB
 #define finger_f64_SCHED_LSB     FINGER_F64_SCHED_LSB

@@ -276,15 +276,15 @@ static int16_t finger_m4_filter(finger_m4_state *s, int16_t e)
 
     /* The trapezoid: half a step of this sample and half a step of the one before. */
     r = finger_m4_integrand_sum(s);
-    /* |sum| <= 1514069612058 < 2^63 */
-    s->inner = foc_clamp64(s->inner + ((int64_t)r + s->inner_input), (-1512213263178), 1512213263178);
+    /* |sum| <= 1525954824034 < 2^63 */
+    s->inner = foc_clamp64(s->inner + ((int64_t)r + s->inner_input), (-1524098475154), 1524098475154);
     s->inner_input = r;
     x += (int32_t)foc_shift64(s->inner, 13);
 
     s->filtered_now = foc_ring_next(s->filtered_now, FINGER_M4_FILTERED);
     foc_ahead_q15(s->denominator_ahead, finger_m4_denominator_far, finger_m4_denominator_runs,
                   finger_m4_denominator_slices, s->filtered, FINGER_M4_FILTERED, s->filtered_now);
-    x = x - finger_m4_denominator_sum(s) + s->carry; /* |x| <= 1017606997 < 2^31 */
+    x = x - finger_m4_denominator_sum(s) + s->carry; /* |x| <= 1019057828 < 2^31 */
     rounded = foc_shift32(x, 15);
     s->carry = x - rounded * ((int32_t)1 << 15); /* the next sample takes up what rounding drops */
     v = foc_sat16(rounded);

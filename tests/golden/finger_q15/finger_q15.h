@@ -30,9 +30,9 @@ typedef int16_t finger_q15_sig;
 
 /* Inputs beyond these ends are taken for the nearest end; the output never leaves its own. */
 #define FINGER_Q15_REF_MIN   0       /* 0 1/mm */
-#define FINGER_Q15_REF_MAX   20972   /* 0.02 1/mm */
-#define FINGER_Q15_MEAS_MIN  (-5243) /* -0.005 1/mm */
-#define FINGER_Q15_MEAS_MAX  20972   /* 0.02 1/mm */
+#define FINGER_Q15_REF_MAX   20972   /* the count nearest to 0.02 1/mm */
+#define FINGER_Q15_MEAS_MIN  (-5243) /* the count nearest to -0.005 1/mm */
+#define FINGER_Q15_MEAS_MAX  20972   /* the count nearest to 0.02 1/mm */
 #define FINGER_Q15_SCHED_MIN 0       /* 0 bar */
 #define FINGER_Q15_SCHED_MAX 16384   /* 0.25 bar */
 #define FINGER_Q15_U_MIN     0       /* 0 V */
@@ -137,7 +137,7 @@ static inline float finger_q15_u_to_f32(finger_q15_sig u)
 }
 #endif
 
-/* The same by the names of before. */
+/* The same with the name as it is spelled, for programs that know them so. */
 #define finger_q15_SAMPLE_TIME   FINGER_Q15_SAMPLE_TIME
 #define finger_q15_REF_LSB       FINGER_Q15_REF_LSB
 #define finger_q15_SCHED_LSB     FINGER_Q15_SCHED_LSB

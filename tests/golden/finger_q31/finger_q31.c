@@ -180,14 +180,14 @@ static int32_t finger_q31_filter(finger_q31_state *s, int32_t e)
 
     /* The trapezoid: half a step of this sample and half a step of the one before. */
     r = finger_q31_integrand_sum(s);
-    /* |sum| <= 6350425556386629306 < 2^63 */
-    s->inner = foc_clamp64(s->inner + (r + s->inner_input), (-6342682138601380864),
-                           6342682138601380864);
+    /* |sum| <= 6426380859462829754 < 2^63 */
+    s->inner = foc_clamp64(s->inner + (r + s->inner_input), (-6418637441677581312),
+                           6418637441677581312);
     s->inner_input = r;
     x += foc_shift64(s->inner, 3);
 
     s->filtered_now = foc_ring_next(s->filtered_now, FINGER_Q31_FILTERED);
-    x = x - finger_q31_denominator_sum(s) + s->carry; /* |x| <= 4365631219347433601 < 2^63 */
+    x = x - finger_q31_denominator_sum(s) + s->carry; /* |x| <= 4375125632231958657 < 2^63 */
     rounded = foc_shift64(x, 31);
     s->carry = x - rounded * ((int64_t)1 << 31); /* the next sample takes up what rounding drops */
     v = foc_sat32(rounded);

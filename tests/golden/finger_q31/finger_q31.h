@@ -30,9 +30,9 @@ typedef int32_t finger_q31_sig;
 
 /* Inputs beyond these ends are taken for the nearest end; the output never leaves its own. */
 #define FINGER_Q31_REF_MIN   0            /* 0 1/mm */
-#define FINGER_Q31_REF_MAX   1374389535   /* 0.02 1/mm */
-#define FINGER_Q31_MEAS_MIN  (-343597384) /* -0.005 1/mm */
-#define FINGER_Q31_MEAS_MAX  1374389535   /* 0.02 1/mm */
+#define FINGER_Q31_REF_MAX   1374389535   /* the count nearest to 0.02 1/mm */
+#define FINGER_Q31_MEAS_MIN  (-343597384) /* the count nearest to -0.005 1/mm */
+#define FINGER_Q31_MEAS_MAX  1374389535   /* the count nearest to 0.02 1/mm */
 #define FINGER_Q31_SCHED_MIN 0            /* 0 bar */
 #define FINGER_Q31_SCHED_MAX 1073741824   /* 0.25 bar */
 #define FINGER_Q31_U_MIN     0            /* 0 V */
@@ -137,7 +137,7 @@ static inline float finger_q31_u_to_f32(finger_q31_sig u)
 }
 #endif
 
-/* The same by the names of before. */
+/* The same with the name as it is spelled, for programs that know them so. */
 #define finger_q31_SAMPLE_TIME   FINGER_Q31_SAMPLE_TIME
 #define finger_q31_REF_LSB       FINGER_Q31_REF_LSB
 #define finger_q31_SCHED_LSB     FINGER_Q31_SCHED_LSB

@@ -69,8 +69,8 @@ typedef struct {
     int64_t increment;                   /* half a trapezoid, of the latest sample */
     int64_t inner;                       /* integral of the terms of negative order, counts of 2^-60 */
     int64_t inner_input;                 /* what was added to it last, half a trapezoid */
-    int64_t low;                         /* the lower one, counts of 2^-56 V */
-    int64_t high;                        /* the upper one, counts of 2^-56 V */
+    int64_t low;                         /* lower limit of the output, counts of 2^-56 V */
+    int64_t high;                        /* upper limit of the output, counts of 2^-56 V */
     float resting;                       /* filtered error that reset has left, until a step */
     float u_min;                         /* lower limit of the output */
     float u_max;                         /* upper limit of the output */
@@ -162,7 +162,7 @@ static inline float finger_f32_u_to_f32(finger_f32_sig u)
 }
 #endif
 
-/* The same by the names of before. */
+/* The same with the name as it is spelled, for programs that know them so. */
 #define finger_f32_SAMPLE_TIME   FINGER_F32_SAMPLE_TIME
 #define finger_f32_REF_LSB       FINGER_F32_REF_LSB
 #define finger_f32_SCHED_LSB     FINGER_F32_SCHED_LSB

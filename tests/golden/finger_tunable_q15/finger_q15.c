@@ -192,13 +192,13 @@ static int16_t finger_q15_filter(finger_q15_state *s, int16_t e)
 
     /* The trapezoid: half a step of this sample and half a step of the one before. */
     r = finger_q15_integrand_sum(s);
-    /* |sum| <= 3026272784580 < 2^63 */
-    s->inner = foc_clamp64(s->inner + ((int64_t)r + s->inner_input), (-3024426526356), 3024426526356);
+    /* |sum| <= 3062524633355 < 2^63 */
+    s->inner = foc_clamp64(s->inner + ((int64_t)r + s->inner_input), (-3060678375131), 3060678375131);
     s->inner_input = r;
     x += (int32_t)foc_shift64(s->inner, 14);
 
     s->filtered_now = foc_ring_next(s->filtered_now, FINGER_Q15_FILTERED);
-    x = x - finger_q15_denominator_sum(s) + s->carry; /* |x| <= 1006619553 < 2^31 */
+    x = x - finger_q15_denominator_sum(s) + s->carry; /* |x| <= 1008832190 < 2^31 */
     rounded = foc_shift32(x, 15);
     s->carry = x - rounded * ((int32_t)1 << 15); /* the next sample takes up what rounding drops */
     v = foc_sat16(rounded);
