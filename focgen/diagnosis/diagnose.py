@@ -25,7 +25,13 @@ from focgen.diagnosis.hypotheses.explain import (
     gained,
     remembering,
 )
-from focgen.diagnosis.hypotheses.initial import begun_session, begun_with, loosened
+from focgen.diagnosis.hypotheses.initial import (
+    begun_as_found,
+    begun_session,
+    begun_with,
+    held_as_fitted,
+    loosened,
+)
 from focgen.diagnosis.hypotheses.input_covariance import input_covariance
 from focgen.diagnosis.model import Diagnosis
 from focgen.diagnosis.numbers import NUMBERS
@@ -103,9 +109,9 @@ def diagnose(
     explanations, session = _slow(search, explanations, session)
     explanations, session = _told_by_another(search, explanations, session)
     explanations, session = _lasting(search, explanations, session)
-    rigs = compose.compose(nominal, explanations, session)
+    rigs = compose.compose(nominal, explanations, held_as_fitted(explanations[0].best, session))
     explanations, rigs, session = _carried_on(search, explanations, rigs, session)
-    session = begun_with(rigs.fitted, rigs.placed, session)
+    session = begun_as_found(explanations[0].best, rigs.fitted, rigs.placed, session)
     session = in_windows(rigs.fitted, session, rigs.placed)
     rigs, diagnosis, evidence = conclude(nominal, session, rigs, explanations, ran, only is not None)
     proposed = propose(nominal, session, explanations, diagnosis.causes)

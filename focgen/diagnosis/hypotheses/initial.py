@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from focgen.diagnosis.fitting.fit import WHITE, fit
+from focgen.diagnosis.fitting.fit import WHITE, Fit, fit
 from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.problem.segments import Segment, cuts, make
 from focgen.logs.begin import REST, Begin
@@ -65,6 +65,21 @@ def begun_with(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment]) -
     """The experiments with their begins told anew by the rig with the effects ``placed`` in it; a session at
     rest as it is."""
     return begun(rig, logs, placed) if any(log.begins or log.stands for log in logs) else tuple(logs)
+
+
+def held_as_fitted(of: Fit, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
+    """The experiments, each with what a pump held as it began, where that was fitted: its first samples alone
+    tell it less well, and what it is off by stays in all that follows."""
+    held = of.problem.held(of.vector)
+    return tuple(replace(log, stands=at) for log, at in zip(logs, held)) if held else tuple(logs)
+
+
+def begun_as_found(
+    of: Fit, rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment]
+) -> tuple[Experiment, ...]:
+    """The experiments with their begins told by what was found, or, of a pump's, as the first segment's fit
+    has them."""
+    return held_as_fitted(of, logs) if of.problem.stood else begun_with(rig, placed, logs)
 
 
 def _refitted(rig: Rig, logs: Sequence[Experiment]) -> tuple[Rig, float]:

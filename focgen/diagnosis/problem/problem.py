@@ -286,10 +286,15 @@ class Problem:
     def _begun(self, stood: np.ndarray) -> Run:
         """The run, with what a pump held as each experiment began off by so many standard deviations."""
         run = self.segment.fed.run
-        if not stood.any():
-            return run
+        return replace(run, stands=self._held(stood)) if stood.any() else run
+
+    def held(self, vector: np.ndarray) -> tuple[float, ...]:
+        """What a pump held as each experiment began; none where that is known."""
+        return self._held(vector[self.head - self.stood : self.head]) if self.stood else ()
+
+    def _held(self, stood: np.ndarray) -> tuple[float, ...]:
         off = _STANDS * self.nominals.level_in * stood
-        return replace(run, stands=tuple(float(s + o) if s else s for s, o in zip(run.stands, off)))
+        return tuple(float(s + o) if s else s for s, o in zip(self.segment.run.stands, off))
 
     def begun(self, vector: np.ndarray) -> np.ndarray:
         """How far each of the segment's ``loose`` ways (k,) is there."""
