@@ -24,7 +24,7 @@ EXAMPLE = """example:
   compiles the folder's C for each core, runs it in an emulator and counts every instruction of every step.
   Cycles are a model, by Arm's published timings, where there are such. A folder that holds several generated
   ones gives one table of them all. What a controller's C has cost before stands in brackets: the folder
-  remembers it in cost.json."""
+  remembers it in cost.json. Exit status 1 where nothing was counted: every core asked for was skipped."""
 
 _HEADS = ("controller", "core", "instructions mean", "worst", "cycles mean", "worst", "flash B", "RAM B",
           "stack B")  # fmt: skip
@@ -50,7 +50,8 @@ def run(args: Namespace) -> Outcome:
     payload = entries[0] if len(entries) == 1 else {"controllers": entries}
     if len(entries) == 1 and args.target != "all":
         payload = {**payload, **payload["targets"][args.target]}
-    return Outcome(payload, _text(found.controllers))
+    counted = any(one.skipped is None for each in found.controllers for one in each.targets.values())
+    return Outcome(payload, _text(found.controllers), counted)
 
 
 def _entry(one: ControllerCost) -> dict[str, Any]:

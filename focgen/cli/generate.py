@@ -7,7 +7,7 @@ import argparse
 from focgen.cli.outcome import Outcome
 from focgen.codegen.generate import PACKAGES, Generated, generate
 from focgen.codegen.kernels import TARGETS
-from focgen.codegen.packages.package import FMI
+from focgen.codegen.packages.package import FMI, check_package
 from focgen.control.controller import ARITHMETICS, MEMORIES
 from focgen.errors import InputError
 from focgen.fractional.continuous import OPERATORS
@@ -89,6 +89,7 @@ def _add_extras(parser: argparse.ArgumentParser) -> None:
         "--for",
         dest="package",
         action="append",
+        type=_package,
         choices=PACKAGES,
         help="what to add to the plain files: a CMake package, an Arduino or PlatformIO library, an FMU",
     )
@@ -120,6 +121,11 @@ def run(args: argparse.Namespace) -> Outcome:
         args.force,
     )
     return Outcome(made.manifest, _text(made))
+
+
+def _package(name: str) -> str:
+    """The name of a package. Raises InputError for one that there is not, with what to do instead."""
+    return check_package(name).name
 
 
 def _one(packages: list[str] | None) -> str:

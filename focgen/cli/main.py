@@ -61,8 +61,15 @@ def commands() -> tuple[str, ...]:
     return tuple(name for name in _COMMANDS if name in present)
 
 
+_NEGATIVE = re.compile(r"-(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|inf|infinity|nan)$", re.IGNORECASE)
+
+
 class _Parser(argparse.ArgumentParser):
     """Reports a wrong argument the way every other error is reported."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self._negative_number_matcher = _NEGATIVE  # argparse's own takes -1e-3 for an option
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """As argparse does, but a mistyped option is said first, not what is missing for want of it."""

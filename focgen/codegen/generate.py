@@ -95,7 +95,8 @@ def generate(
     wanted = check_package(for_, fmi)
     kernels = _kernels(target)
     text, made, where = _source(controller)
-    _check(arithmetic, memory, made.length if length is None else length)
+    _check(arithmetic, memory)
+    _check_length(*((f"{where} [length]", made.length) if length is None else ("--length", length)))
     form = made.memory if memory is None else memory
     _check_form(form, length, tolerance, horizon)
     own = made.operator if form == "exponential" else "gl"
@@ -182,17 +183,19 @@ def _source(controller: ControllerLike) -> tuple[bytes, Controller, str]:
     return controller_text(made).encode("utf-8"), made, made.name
 
 
-def _check(arithmetic: str | None, memory: str | None, length: int) -> None:
+def _check(arithmetic: str | None, memory: str | None) -> None:
     if arithmetic is not None:
         check_choice("--arithmetic", arithmetic, ARITHMETICS)
     if memory is not None:
         check_choice("--memory", memory, MEMORIES)
+
+
+def _check_length(where: str, length: int) -> None:
+    """Raise InputError for a length that C cannot count, ``where`` being what it comes from."""
     if not isinstance(length, int) or isinstance(length, bool) or length < 1:
-        raise InputError("--length", f"is {length!r}", "give a memory length of at least 1 sample")
+        raise InputError(where, f"is {length!r}", "give a memory length of at least 1 sample")
     if length > LONGEST:
-        raise InputError(
-            "--length", f"is {length}, more than the ring in C can count", f"give at most {LONGEST}"
-        )
+        raise InputError(where, f"is {length}, more than the ring in C can count", f"give at most {LONGEST}")
 
 
 def _kernels(target: str | None) -> Kernels:

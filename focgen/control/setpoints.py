@@ -2,7 +2,21 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
+from focgen.errors import DesignError
+
 _TENTHS = tuple(range(1, 8))
+
+
+def check_setpoints(given: Sequence[float]) -> None:
+    """Raise DesignError where there are none, or one is no finite number."""
+    remedy = "give outputs in the rig's unit"
+    if not given:
+        raise DesignError("--setpoints", "are none", remedy)
+    if not all(map(math.isfinite, given)):
+        raise DesignError("--setpoints", "are not finite numbers", remedy)
 
 
 def default_setpoints(rest: float, span: tuple[float, float]) -> tuple[float, ...]:

@@ -43,7 +43,7 @@ from focgen.diagnosis.verdict import compose
 from focgen.diagnosis.verdict.conclude import conclude
 from focgen.diagnosis.verdict.evidence import drawn_of
 from focgen.diagnosis.verdict.unexplained import is_noise
-from focgen.errors import FocgenError, LogError
+from focgen.errors import FocgenError, InputError, LogError
 from focgen.logs.experiment import Experiment
 from focgen.logs.filled import with_readings
 from focgen.logs.read import Logs, each_of
@@ -89,7 +89,7 @@ def diagnose(
     Raises RigError, LogError, ControllerError for files that cannot be used, InputError where ``out`` holds
     one of them, or somebody else's file, in the place of a result, FocgenError for an unknown effect.
     """
-    _check(only)
+    _check(only, bootstrap)
     each = each_of(logs)
     given = (rig, *each, controller)
     if out is not None:
@@ -360,7 +360,9 @@ def _usable(logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
     return tuple(logs)
 
 
-def _check(only: Sequence[str] | None) -> None:
+def _check(only: Sequence[str] | None, bootstrap: int) -> None:
+    if bootstrap < 0 or bootstrap == 1:
+        raise InputError("bootstrap", f"is {bootstrap}", "give at least 2 sessions, or 0 for none")
     for name in only or ():
         if name not in EFFECTS:
             raise FocgenError(name, "is no effect of the library", f"known: {', '.join(sorted(EFFECTS))}")

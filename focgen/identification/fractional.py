@@ -206,9 +206,10 @@ def _with_one_more(problem: Problem, point: Point, i: int) -> tuple[Problem, Poi
 def _worth(problem: Problem, point: Point, other: Problem, trial: Point, i: int) -> bool:
     """Whether a step more in experiment ``i`` explains something that is no misfit."""
     x, made = problem.experiments[i], _pasts_of(other, trial, problem.experiments[i])
-    alone = (x.measured - other.from_rest(trial, i))[: made.shape[1]]
+    answer = other.from_rest(trial, i)
+    alone = (x.measured - answer)[: made.shape[1]]
     fell = worth_it(problem.residuals(point)[i], other.residuals(trial)[i])
-    return fell and trial.cost < point.cost and asks_for_past(alone, made, _reach(problem))
+    return fell and trial.cost < point.cost and asks_for_past(alone, made, _reach(problem), answer)
 
 
 def _reach(problem: Problem) -> float:

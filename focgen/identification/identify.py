@@ -224,7 +224,8 @@ def _joint(excitations: list[Excitation], fit: FractionalFit, fits: list[Experim
         "gain": tuple(map(_span, fit.gain, half["gain"])),
     }
     if half["delay"]:
-        ci95["delay"] = _span(fit.delay, half["delay"])
+        low, high = _span(fit.delay, half["delay"])
+        ci95["delay"] = max(low, 0.0), high  # nothing answers ahead of its input
     return Joint(
         T=T,
         alpha=alpha,

@@ -27,7 +27,7 @@ def answer_from_its_past(x: Excitation, actuator: Actuator, delay: float = 0.0) 
     long = kernels(*at, x.stepped.count, delay + x.late)
     reach = float(np.ptp(x.measured))
     while len(chosen) < MOST_STEPS and np.std(left) > EXACT * x.spread:
-        if not asks_for_past(left, columns(x, long, times(x), 1)[0], reach):
+        if not asks_for_past(left, columns(x, long, times(x), 1)[0], reach, made):
             break
         grid = columns(x, long, times(x, 4), 1)[0]
         chosen.append(grid[best_time(left, grid)])

@@ -28,6 +28,9 @@ _ASKED_OF_MISFIT = 25.0  # χ² that a past has to take off a misfit …
 _HALVED = 1.0  # … and variance, over what it leaves
 EXACT = 1e-4  # of the spread: what is left below shows no past
 _ASKED = 6.0  # χ² beyond what as many free values take off by chance, from which a past is estimated
+_ASKED_AHEAD = 12.0  # … and of the few samples ahead of the answer alone, where less is known of the noise
+_UNMOVED = 1.0  # standard deviations of what is left: nearer to its first value an answer has not begun
+_TELLS = 8  # first samples without an answer, from which on they tell whether there was a past
 
 
 @dataclass(frozen=True)
@@ -87,24 +90,56 @@ def best_time(residual: Array, made: Array) -> int:
     return int(np.argmax(np.abs(centred @ (residual - residual.mean())) / sizes))
 
 
-def asks_for_past(residual: Array, made: Array, reach: float) -> bool:
+def asks_for_past(residual: Array, made: Array, reach: float, answer: Array) -> bool:
     """Whether what the right model leaves, (n,), asks for a past with columns like ``made`` (times, n).
 
-    The χ² that such a past takes off the whitened residual has to tell it from noise, see :func:`suggestion`.
-    What a model that is not quite true leaves is no stationary noise, though. So the best single step has to
-    take off enough of the residual itself, too, counted in as many samples as its rest is worth.
+    ``answer`` (n,) is the model's from rest. The χ² that such a past takes off the whitened residual has to
+    tell it from noise, see :func:`suggestion`. What a model that is not quite true leaves is no stationary
+    noise, though. So the best single step has to take off enough of the residual itself, too, counted in as
+    many samples as its rest is worth.
+
+    Noise that came in with the input, and a misfit, wander as slowly as a past does. From rest nothing moves
+    ahead of the answer, though, and what a past leaves moves fastest there. So a past has to show in the
+    samples ahead of the answer, where they are enough to tell. One too slow for that has to halve what is
+    left.
     """
-    return suggestion(residual, made, reach) > 0.0 and _explains(residual, made[best_time(residual, made)])
+    rows = _whitened(residual, made)
+    if _beyond_chance(rows, reach) <= _ASKED:
+        return False
+    without = _without(residual, made[best_time(residual, made)])
+    if not worth_it(residual, without):
+        return False
+    ahead = rows[: max(_ahead(residual, answer) - (len(residual) - len(rows)), 0)]
+    shows = len(ahead) < _TELLS or _beyond_chance(ahead, reach) > _ASKED_AHEAD
+    return shows or _halved(residual, without)
+
+
+def _ahead(residual: Array, answer: Array) -> int:
+    """How many first samples there are before the model's answer (n,) from rest begins."""
+    away = np.abs(answer[: len(residual)] - answer[0]) > _UNMOVED * np.std(residual)
+    return int(np.argmax(away)) if away.any() else len(residual)
 
 
 def suggestion(residual: Array, made: Array, reach: float) -> float:
     """The χ² that a past takes off the whitened residual, beyond what as many free values as the data really
     determine take off by chance (Akaike's criterion), and a margin."""
+    return _beyond_chance(_whitened(residual, made), reach) - _ASKED
+
+
+def _whitened(residual: Array, made: Array) -> Array:
+    """Columns: residual, offset and those of a past, made white and in units of the noise; without the first
+    samples, which the filter needs."""
     basis = np.vstack([np.ones(len(residual)), made]).T
     model = residual_model(residual - basis @ np.linalg.lstsq(basis, residual, rcond=1e-6)[0])
     white = lfilter(model.a, [1.0], np.column_stack([residual, basis]), axis=0)[len(model.a) - 1 :]
-    gained, free = _gain(white / np.sqrt(model.variance), reach)
-    return gained - 2.0 * free - _ASKED
+    rows: Array = white / np.sqrt(model.variance)
+    return rows
+
+
+def _beyond_chance(rows: Array, reach: float) -> float:
+    """The χ² that the columns of a past take off, less twice the number of values that are free."""
+    gained, free = _gain(rows, reach)
+    return gained - 2.0 * free
 
 
 def _gain(rows: Array, reach: float) -> tuple[float, float]:
@@ -117,17 +152,26 @@ def _gain(rows: Array, reach: float) -> tuple[float, float]:
     return float(share @ (singular.T @ rows[:, 0]) ** 2), float(np.sum(share))
 
 
-def _explains(residual: Array, column: Array) -> bool:
-    """Whether one column takes enough off a residual, (n,) each."""
+def _without(residual: Array, column: Array) -> Array:
+    """What one column, beside an offset, leaves of a residual, (n,) each."""
     basis = np.column_stack([np.ones(len(residual)), column])
-    return worth_it(residual, residual - basis @ np.linalg.lstsq(basis, residual, rcond=None)[0])
+    left: Array = residual - basis @ np.linalg.lstsq(basis, residual, rcond=None)[0]
+    return left
 
 
 def worth_it(before: Array, after: Array) -> bool:
     """Whether a residual (n,) fell by enough, over the variance of what is left, in effective samples; by
     half where what is left is likely a misfit."""
-    taken = float(np.var(before)) / max(float(np.var(after)), 1e-300) - 1.0
     effective = max(residual_model(after).effective, _AT_LEAST)
     if effective > _WHITE * len(after):
-        return taken * effective > _ASKED
-    return taken > _HALVED and taken * effective > _ASKED_OF_MISFIT
+        return _taken(before, after) * effective > _ASKED
+    return _halved(before, after) and _taken(before, after) * effective > _ASKED_OF_MISFIT
+
+
+def _halved(before: Array, after: Array) -> bool:
+    return _taken(before, after) > _HALVED
+
+
+def _taken(before: Array, after: Array) -> float:
+    """The variance that was taken off, over what is left."""
+    return float(np.var(before)) / max(float(np.var(after)), 1e-300) - 1.0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -12,12 +11,14 @@ from focgen.arrays import Array
 from focgen.control.controller import ControllerRanges
 from focgen.control.equilibrium import Equilibrium, derived_ranges, holding, rest
 from focgen.control.inversion import Inversion, invert
-from focgen.control.setpoints import default_setpoints
+from focgen.control.setpoints import check_setpoints, default_setpoints
 from focgen.errors import DesignError
 from focgen.loop.linear_effects import linear_part
 from focgen.present import present
+from focgen.rig.response import check_bounded
 from focgen.rig.rig import Ranges, Rig
 
+WATCHED = 1e4  # s that no stage may grow in by itself: no loop of an inverse holds what grows
 _EXTRAPOLATED = 0.5  # of the span of the operating points: how far beyond it the line K_o(p) is used
 
 
@@ -54,9 +55,11 @@ def prepare(
 ) -> tuple[Bench, list[str]]:
     """Return the bench for operating points at the outputs ``setpoints``, and what has to be said about it.
 
-    Raises DesignError where the rig cannot be inverted, held at a set point, or scheduled.
+    Raises DesignError where the rig cannot be inverted, held at a set point, or scheduled, RigError where a
+    stage of it grows by itself.
     """
     inversion = invert(rig, 1.0)  # for K(p) only, and to refuse early what cannot be inverted
+    check_bounded(rig, WATCHED)
     ranges, derived = derived_ranges(rig)
     notes = [*derived, *_said(rig)]
     start = rest(rig, present(ranges.command))
@@ -94,8 +97,7 @@ def _said(rig: Rig) -> list[str]:
 def _points(
     rig: Rig, references: Sequence[float], start: Equilibrium, ranges: Ranges
 ) -> tuple[Equilibrium, ...]:
-    if not references or not all(map(math.isfinite, references)):
-        raise DesignError("--setpoints", "are not finite numbers", "give outputs in the rig's unit")
+    check_setpoints(references)
     if any(reference == start.output for reference in references):
         raise DesignError(
             "--setpoints", f"hold the rest itself ({start.output:g})", "give outputs away from rest"

@@ -16,10 +16,11 @@ from focgen.control.controller import Controller
 from focgen.control.equilibrium import Equilibrium, derived_ranges, holding, rest, within_reach
 from focgen.control.files import ControllerLike, controller_from
 from focgen.control.measures import StepMeasures, measure_step
-from focgen.control.setpoints import default_setpoints
+from focgen.control.setpoints import check_setpoints, default_setpoints
 from focgen.control.units import check_one_unit
 from focgen.custody import sha256_of
 from focgen.errors import ControllerError, DesignError
+from focgen.loop.bench import WATCHED
 from focgen.loop.chain import chain
 from focgen.loop.frozen import frozen_loop, frozen_margins, frozen_step
 from focgen.loop.learned import learned_notes
@@ -31,6 +32,7 @@ from focgen.loop.worst import Worst, worst_case
 from focgen.plan.build import build_plan
 from focgen.plan.plan import Plan
 from focgen.rig.arguments import RigLike, file_of, rig_of
+from focgen.rig.response import check_bounded
 from focgen.rig.rig import Rig
 from focgen.shown import Shown
 
@@ -130,6 +132,7 @@ def simulate(
     ranges, derived = derived_ranges(model)
     _check_fit(model, which)
     notes = [*derived, *_said(model, which, file_of(rig))]
+    check_bounded(model, WATCHED)
     plan = build_plan(which, arithmetic, length)
     start = rest(model, which.ranges.output)
     targets = _targets(model, which, setpoints, start, consecutive)
@@ -196,8 +199,7 @@ def _targets(
     if setpoints is None:
         return default_setpoints(start.output, rig.ranges.output or (low, high))
     targets = tuple(map(float, setpoints))
-    if not targets or not all(map(math.isfinite, targets)):
-        raise DesignError("--setpoints", "are not finite numbers", "give outputs in the rig's unit")
+    check_setpoints(targets)
     outside = [t for t in targets if not low <= t <= high]
     if outside:
         raise DesignError(

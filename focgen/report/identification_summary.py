@@ -49,7 +49,10 @@ def _stage(fit: StageFit) -> dict[str, Any]:
         "den": terms_of(fit.transfer.den),
         "delay": fit.delay,
         "gof": fit.gof,
-        "parameters": {name: {"value": v, "ci95": (v - h, v + h)} for name, (v, h) in fit.parameters.items()},
+        "parameters": {
+            name: {"value": v, "ci95": (max(v - h, 0.0) if name == "delay" else v - h, v + h)}
+            for name, (v, h) in fit.parameters.items()
+        },
         "up_down": up_down,
         "shapes": {one.shape: {"bic": one.bic, "gof": one.gof, "refused": one.refused} for one in fit.fits},
     }
@@ -160,7 +163,8 @@ def gain_text(found: Identification) -> str:
     known = joint.gain_r2 is not None and 1 < len(each) < steps
     r2 = f",  R² of the single fits = {joint.gain_r2:.4f}" if known else ""
     span = joint.ci95.get("delay")
-    late = f"\ndead time = {_pm(joint.delay, span)} s" if span else ""
+    high: Any = span[1] if span else 0.0  # the lower end may have been cut at 0
+    late = f"\ndead time = {_pm(joint.delay, (2.0 * joint.delay - high, high))} s" if span else ""
     return f"K(p) = {terms}{r2}{late}"
 
 

@@ -156,6 +156,8 @@ def _take(path: Path, chain: _Chain) -> None:
         _take_toml(path, chain)
     elif path.suffix in (".html", ".htm", ".png", ".c", ".h", ".md"):
         raise InputError(str(path), "is nothing that a report is made of", _TAKEN)
+    elif not path.exists():
+        raise InputError(str(path), "does not exist", f"check the path; {_TAKEN}")
     else:
         chain.logs.append(path)
 

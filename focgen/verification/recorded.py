@@ -35,6 +35,7 @@ _SHAPE = {
     "package?": {"for": str, "fmi?": int},
     "tunable?": dict,
     "inputs": dict,
+    "files": dict,
 }
 _EXPONENTIAL = {"tolerance": float, "horizon": int}
 _CONTINUOUS = {"tolerance": float, "band": list}
@@ -86,7 +87,7 @@ def read_recorded(folder: Path) -> Recorded:
     target = found["kernels"]["target"] if "kernels" in found else None
     if target is not None:
         check_choice(f"{where} [kernels]", target, TARGETS)
-    name = check_name(found["name"], where)
+    name = _name(where, found)
     options = found["arithmetic"], found["memory"], *_memory(path, found)
     bound, floats = _bound(found["error_bound"]), not found.get("no_float", False)
     recorded = Recorded(name, *options, Kernels(target), "selftest" in found, bound, floats, found)
@@ -114,9 +115,25 @@ def _check_shape(path: Path, found: Any, shape: dict[str, Any]) -> None:
             raise InputError(str(path), f"lacks {name!r} as it was written", AGAIN)
 
 
+def _name(where: str, found: dict[str, Any]) -> str:
+    """Of the C, which has files of this name."""
+    try:
+        name = check_name(found["name"], where)
+    except InputError as fault:
+        raise InputError(where, fault.what, AGAIN) from None
+    if f"{name}.c" not in found["files"]:
+        raise InputError(where, f"has the name {name!r}, and files of another", AGAIN)
+    return name
+
+
+def made_here(generator: str) -> bool:
+    """Whether this version of focgen has written what names ``generator``."""
+    return generator.removeprefix("focgen ") == focgen.__version__
+
+
 def _check_version(path: Path, generator: str) -> None:
     made_by, here = generator.removeprefix("focgen "), focgen.__version__
-    if made_by != here:
+    if not made_here(generator):
         what = f"was written by focgen {made_by}, and this is {here}"
         raise InputError(str(path), what, f"use focgen {made_by}, or run focgen generate again with this one")
 

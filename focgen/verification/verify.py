@@ -8,9 +8,10 @@ from pathlib import Path
 
 from focgen.arguments import checked
 from focgen.codegen.kernels import TARGETS as CORES
-from focgen.errors import InputError
+from focgen.errors import FocgenError, InputError
 from focgen.shown import Shown
 from focgen.targets.selection import selected
+from focgen.verification.beyond import arithmetic_of, edited_beyond
 from focgen.verification.compare import TargetResult, compare, observed, self_tested
 from focgen.verification.folder import GeneratedFolder, read_folder, sources
 from focgen.verification.host import Library
@@ -22,6 +23,7 @@ TARGETS = ("host", *CORES)
 _SAMPLES = 10_000  # on the host
 MOST_SAMPLES = 10_000_000
 """Of mixed inputs in one run, which take some 4 GB."""
+_LEFT_BEYOND = "the folder has been edited, so nothing of it was compiled (run focgen generate again)"
 _LEFT = "the folder has been edited, so nothing of it was compiled (--edited does)"
 
 
@@ -71,8 +73,8 @@ def verify(
     The C runs in a process of its own; where it crashes or does not return, that is a mismatch. That is no
     sandbox: an edited folder is code, and runs with the caller's rights.
 
-    Raises InputError for a folder that is none or was made by another version of focgen, BuildError where the
-    C does not compile.
+    Raises InputError for a folder that is none or was made by another version of focgen, or, with ``edited``,
+    was edited into what no plan can be made of. BuildError where the C does not compile.
     """
     if samples is not None and (not isinstance(samples, int) or samples < 1):
         raise InputError("--samples", f"is {samples!r}", "give at least 1")
@@ -81,7 +83,15 @@ def verify(
         raise InputError("--samples", what, "verify several times, each with a --seed of its own")
     if seed < 0:
         raise InputError("--seed", f"is {seed}", "give 0 or more")
-    names, read = selected(target, TARGETS), read_folder(folder)
+    names = selected(target, TARGETS)
+    try:
+        read = read_folder(folder)
+    except FocgenError as fault:
+        named = None if edited else edited_beyond(Path(folder), fault)
+        if named is None:
+            raise
+        results = dict.fromkeys(names, TargetResult(skipped=_LEFT_BEYOND))
+        return Verification(Path(folder).resolve().name, arithmetic_of(Path(folder)), results, (named,))
     if read.differences and not edited:
         results = dict.fromkeys(names, TargetResult(skipped=_LEFT))
     else:

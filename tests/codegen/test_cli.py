@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 import venv
@@ -44,12 +45,12 @@ FINGER = ROOT / "tests" / "golden" / "finger.toml"
         (["--memory", "exponential", "--horizon", "1e5"], "invalid int value"),
         (["--memory", "eternal"], "invalid choice"),
         (["--target", "z80"], "cortex-m4"),
-        (["--for", "zephyr"], "invalid choice"),
+        (["--for", "zephyr"], "docs/packages.md"),
         (["--for", "cmake", "--for", "fmu"], "into a folder of its own"),
         (["--fmi", "2"], "add that"),
         (["--for", "cmake", "--fmi", "3"], "--for fmu"),
         (["--for", "fmu", "--fmi", "1"], "invalid choice"),
-        (["--for", "matlab"], "invalid choice"),
+        (["--for", "matlab"], "choose one of plain, cmake"),
         (["--tolerance", "1e-3"], "--length"),
         (["--horizon", "100"], "--length"),
         (["--name", "while"], "is a keyword"),
@@ -276,3 +277,12 @@ def test_an_installed_wheel_generates_the_same_bytes(tmp_path):
     assert {
         p.relative_to(empty / "fw"): p.read_bytes() for p in (empty / "fw").rglob("*") if p.is_file()
     } == expected
+
+
+def test_a_length_is_blamed_on_where_it_stands(tmp_path, capsys):
+    made = tmp_path / "long.toml"
+    made.write_text(re.sub(r"(?m)^length = \d+", "length = 70000", FINGER.read_text()))
+    assert main(["generate", str(made), "--out", str(tmp_path / "out")]) == 2
+    assert "long.toml [length]: is 70000" in capsys.readouterr().err
+    assert main(["generate", str(made), "--out", str(tmp_path / "out"), "--length", "70000"]) == 2
+    assert "--length: is 70000" in capsys.readouterr().err

@@ -70,6 +70,8 @@ def test_diagnose_writes_what_it_says(made, capsys):
         (["diagnose", "RIG", "LOG"], "--out"),
         (["diagnose", "RIG", "nowhere.csv", "--out", "OUT"], "nowhere.csv"),
         (["diagnose", "RIG", "LOG", "--out", "OUT", "--from", "1e6"], ""),
+        (["diagnose", "RIG", "LOG", "--out", "OUT", "--bootstrap", "-5"], "bootstrap: is -5"),
+        (["diagnose", "RIG", "LOG", "--out", "OUT", "--bootstrap", "1"], "at least 2"),
         (["replay", "nowhere.toml", "LOG"], "nowhere.toml"),
     ],
 )

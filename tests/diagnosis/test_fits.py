@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from focgen.diagnosis.fitting.fit import WHITE, _solved, fit, innovations, jacobian
+from focgen.diagnosis.fitting.fit import WHITE, _cost, _solved, fit, innovations, jacobian
 from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.hypotheses.search import best_start, footings
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
@@ -130,3 +130,13 @@ def test_a_step_goes_nowhere_of_which_nothing_is_known(known):
     sure = slice(None) if known else slice(4)
     np.testing.assert_allclose(step[sure], wanted[sure], rtol=1e-6)
     assert known or abs(step[4]) < 1e-9
+
+
+def test_a_vector_that_is_hopelessly_unlikely_costs_more_than_any_other_without_a_warning(problem):
+    expected, precision = problem.known
+    assert precision.any()
+    far, near = expected + 1e4 * (precision > 0.0), expected
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        costs = [_cost(problem, vector, 1.0, 50) for vector in (near, far)]
+    assert costs[0] == 1.0 and 1e100 < costs[1] < np.inf

@@ -83,3 +83,13 @@ def test_a_dead_time_beyond_reach_is_refused(tmp_path):
     with pytest.raises(FitError, match="longest that is looked for"):
         identify(paper_rig(), [log], tmp_path / "new.toml", delay=True, gain_degree=0, integer=False)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_interval_of_a_dead_time_ends_at_zero():
+    """Without a dead time it is as likely to come out above as below."""
+    t, of = STEP * np.arange(-50, 1100), Truth(delay=0.0)
+    rng = np.random.default_rng(1)
+    logs = [log_of(f"{p}", t, held(p, t, of), (0.002, 0.01), rng) for p in LEVELS]
+    found = identify(paper_rig(), logs, delay=True, integer=False).joint
+    low, high = found.ci95["delay"]
+    assert low == 0.0 <= found.delay < high < STEP

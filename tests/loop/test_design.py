@@ -255,6 +255,12 @@ FAULTS = {
     "out of reach": (paper_rig(), {"setpoints": [0.01, 0.5]}, "0.5 is out of reach; reachable is 0 … 0.345"),
     "at rest": (paper_rig(), {"setpoints": [0.0]}, "the rest itself"),
     "NaN set point": (paper_rig(), {"setpoints": [math.nan]}, "not finite"),
+    "no set point": (paper_rig(), {"setpoints": []}, "are none"),
+    "a regulator that grows": (
+        replace(paper_rig(), regulator=TransferFunction([(0.5, 0)], [(0.3, 1), (-1.0, 0)])),
+        {},
+        "grows by itself, by a factor of e every 0.3 s",
+    ),
     "settling NaN": (paper_rig(), {"settling": math.nan}, "above 0 s"),
     "settling 0": (paper_rig(), {"settling": 0.0}, "above 0 s"),
     "settling next to 0": (paper_rig(), {"settling": 1e-320}, "above 0 s"),

@@ -281,3 +281,14 @@ def test_a_curvature_in_another_unit_than_the_output_is_told_of_without_a_sensor
     assert any("a curvature in 1/m counts as an output in 1/mm" in note for note in said)
     one = replace(signals, units={"curvature": "1/mm", "output": "1/mm"})
     assert not any("counts as an output" in note for note in derived_ranges(replace(rig, signals=one))[1])
+
+
+def test_no_set_points_are_not_numbers_that_are_infinite():
+    with pytest.raises(DesignError, match="are none"):
+        simulate(paper_rig(), paper_controller(40), setpoints=[])
+
+
+def test_a_rig_that_grows_by_itself_is_told_by_its_stage():
+    grows = TransferFunction([(0.5, 0)], [(0.3, 1), (-1.0, 0)])
+    with pytest.raises(FocgenError, match="regulator.*grows by itself"):
+        simulate(replace(paper_rig(), regulator=grows), paper_controller(40), setpoints=[0.004])

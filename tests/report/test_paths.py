@@ -142,3 +142,8 @@ def test_without_the_library_the_remedy_is_one_line(command, monkeypatch, tmp_pa
     out = [] if "--out" in command else ["--out", "r.html"]
     assert main([*command, *out]) == 2
     assert "pip install 'focgen[report]'" in capsys.readouterr().err and not list(tmp_path.iterdir())
+
+
+def test_a_path_that_is_not_there_is_no_log(tmp_path):
+    with pytest.raises(InputError, match="nothing: does not exist"):
+        focgen.report([tmp_path / "nothing"], tmp_path / "page.html")

@@ -263,3 +263,28 @@ def test_a_log_of_one_row_is_refused_in_a_line_and_no_warning_beside(tmp_path):
 def test_measured_logs(open_data, name, roles):
     found = focgen.init(open_data / f"{name}.csv").rig.signals
     assert (found.command, found.pressure, found.output) == roles
+
+
+@pytest.mark.parametrize(
+    "rows, told",
+    [
+        (lambda rows: [*rows[:50], rows[51], rows[50], *rows[52:]], "time has to increase"),
+        (lambda rows: rows[:2], "at least 8"),
+    ],
+)
+def test_a_log_that_other_commands_refuse_is_doubted(tmp_path, capsys, rows, told):
+    lines = [f"{t:.2f},{u},{p:.6f},{y:.6f}" for t, u, p, y in zip(TIME, HELD, PRESSURE, ANSWER)]
+    log, out = tmp_path / "log.csv", tmp_path / "rig.toml"
+    log.write_text("\n".join(["t_s,u_V,p_bar,kappa_per_mm", *rows(lines)]) + "\n")
+    assert main(["init", str(log), "--out", str(out), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert told in said["doubts"][0] and said["text"] == out.read_text()
+    assert any(line.startswith("# unsure: the logs: ") and told in line for line in said["text"].splitlines())
+    assert main(["replay", str(out), str(log)]) == 2 and told in capsys.readouterr().err
+
+
+def test_a_log_that_can_be_used_has_no_such_doubt(tmp_path, capsys):
+    np.savetxt(tmp_path / "log.csv", np.column_stack([TIME, HELD, PRESSURE, ANSWER]), delimiter=",",
+               header="t_s,u_V,p_bar,kappa_per_mm", comments="")  # fmt: skip
+    assert main(["init", str(tmp_path / "log.csv"), "--json"]) == 0
+    assert not [d for d in json.loads(capsys.readouterr().out)["doubts"] if d.startswith("the logs")]

@@ -279,8 +279,11 @@ def test_the_command_compares_folders_and_names_what_it_skips(tmp_path, capsys, 
 
     monkeypatch.setattr(module.shutil, "which", lambda name: None)
     module._gcc_of.cache_clear()
-    assert main(["cost", str(tmp_path / "q15"), "--target", "cortex-m3", "--compiler", "gcc"]) == 0
+    argv = ["cost", str(tmp_path / "q15"), "--target", "cortex-m3", "--compiler", "gcc"]
+    assert main(argv) == 1  # nothing was counted
     assert "apt-get install gcc-arm-none-eabi" in capsys.readouterr().out
+    assert main([*argv, "--json"]) == 1
+    assert "apt-get" in json.loads(capsys.readouterr().out)["skipped"]
     module._gcc_of.cache_clear()
 
 

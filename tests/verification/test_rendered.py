@@ -195,8 +195,10 @@ def test_a_name_that_leads_elsewhere_is_refused(folder, tmp_path, name, edited, 
     name = name.format(tmp_path)
     rewrite(folder, lambda manifest: manifest.update(name=name))
     before = sorted(tmp_path.rglob("*"))
-    assert main(["verify", str(folder), *["--edited"] * edited]) == 2
-    assert "the name " in capsys.readouterr().err
+    assert main(["verify", str(folder), *["--edited"] * edited]) == (2 if edited else 1)
+    said = capsys.readouterr()
+    assert "manifest.json: " in said.out + said.err and "the name " in said.out + said.err
+    assert "--name" not in said.out + said.err
     with pytest.raises(InputError, match="the name "):
         focgen.cost(folder, "cortex-m3", edited=edited)
     assert sorted(tmp_path.rglob("*")) == before
@@ -228,6 +230,34 @@ def test_an_option_that_is_none_is_refused(folder, change, told, nothing_compile
     assert main(["verify", str(folder), "--edited"]) == 2
     err = capsys.readouterr().err
     assert re.search(told, err) and err.count("\n") == 1, err
+
+
+@pytest.mark.parametrize(
+    "file, old, new, told",
+    [
+        ("manifest.json", '"name": "spba"', '"name": "spbb"', "manifest.json: .*'spbb'"),
+        ("manifest.json", '"length": 24', '"length": "x"', "manifest.json: .*'length'"),
+        ("manifest.json", '"arithmetic": "q15"', '"arithmetic": "q7"', "manifest.json: .*'q7'"),
+        ("controller.toml", "length = 24", "length = -60", r"controller.toml: .*\[length\] is -60"),
+        ("controller.toml", "sample_time =", "sample =", "controller.toml: .*'sample_time'"),
+    ],
+)
+def test_an_edit_that_nothing_can_be_rendered_from_is_named(
+    folder, file, old, new, told, nothing_compiled, capsys
+):
+    text = (folder / file).read_text()
+    assert old in text
+    (folder / file).write_text(text.replace(old, new, 1))
+    assert main(["verify", str(folder), "--json"]) == 1
+    (difference,) = json.loads(capsys.readouterr().out)["differences"]
+    assert re.search(told, difference), difference
+    assert main(["verify", str(folder), "--edited"]) == 2
+
+
+def test_a_file_that_is_missing_is_no_edit(folder, capsys):
+    (folder / "spba.h").unlink()
+    assert main(["verify", str(folder)]) == 2
+    assert "lacks spba.h" in capsys.readouterr().err
 
 
 RAW = (b"[" * 3000, b'{"length": ' + b"9" * 5000 + b"}", b"\xff", b"NaN", b'{"a": 1e999}')

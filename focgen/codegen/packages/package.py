@@ -20,6 +20,8 @@ _FILES: Mapping[str, Callable[[Made], dict[str, str | bytes]]] = {
     "fmu": fmu_files,
 }
 PACKAGES = tuple(_FILES)
+_ABSENT = {"zephyr": "is not offered, since Zephyr's own check of a module cannot be run here"}
+_INSTEAD = "leave --for out and add the plain folder to the application; docs/packages.md has the lines"
 FMI = (2, 3)
 """Versions of the Functional Mock-up Interface: 2.0 and 3.0."""
 README = "README.md"
@@ -48,6 +50,8 @@ def check_package(name: str, fmi: int | None = None) -> Package:
 
     Raises InputError for a package or a version that there is not, and for a version without an FMU.
     """
+    if name in _ABSENT:
+        raise InputError("--for", f"{name}: {_ABSENT[name]}", _INSTEAD)
     check_choice("--for", name, PACKAGES)
     if name != "fmu":
         if fmi is not None:

@@ -17,6 +17,7 @@ STEP = 1e-4
 _SURE, _NOTHING = 1e-10, 1e-12  # of the largest of a matrix: what is sure to be known, and what is not
 FIXED = 1e-6  # a parameter whose bounds are as close is none
 _STALE = 2  # iterations that rows of the Jacobian are kept for
+_HOPELESS = 600.0  # exponent: so unlikely, no fit is better than another, and exp would pass a float's end
 _LAGGING = 0.01  # of what a fit is behind another: one that gains less by an iteration will not reach it
 
 
@@ -183,7 +184,7 @@ def _nats(count: int, cost: float, better: float) -> float:
 
 def _cost(problem: Problem, vector: np.ndarray, sse: float, count: int) -> float:
     """The sum of squares that would be as unlikely alone as this one with these nominal parameters."""
-    return sse * float(np.exp(2.0 * problem.unlikely(vector) / max(count, 1)))
+    return sse * float(np.exp(min(2.0 * problem.unlikely(vector) / max(count, 1), _HOPELESS)))
 
 
 def jacobian(
