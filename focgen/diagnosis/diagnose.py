@@ -13,7 +13,8 @@ import numpy as np
 from focgen.arguments import checked
 from focgen.control.files import ControllerLike, controller_from
 from focgen.control.units import check_one_unit
-from focgen.diagnosis.controller.check import CONTROLLER_EFFECTS, check_controller
+from focgen.diagnosis.asked import check_asked, usable
+from focgen.diagnosis.controller.check import check_controller
 from focgen.diagnosis.fitting.fit import Fit
 from focgen.diagnosis.fitting.predictability import predicted
 from focgen.diagnosis.hypotheses.bootstrap import threshold as bootstrapped
@@ -43,7 +44,6 @@ from focgen.diagnosis.verdict import compose
 from focgen.diagnosis.verdict.conclude import conclude
 from focgen.diagnosis.verdict.evidence import drawn_of
 from focgen.diagnosis.verdict.unexplained import is_noise
-from focgen.errors import FocgenError, InputError, LogError
 from focgen.logs.experiment import Experiment
 from focgen.logs.filled import with_readings
 from focgen.logs.read import Logs, each_of
@@ -61,7 +61,6 @@ from focgen.rig.session import run_of
 
 _RIVALS = 3  # of what was found that may tell how the logs begin
 _CARRIED = 2  # times that findings are made anew with what they left in later experiments
-EFFECTS = {*library(), *CONTROLLER_EFFECTS}
 WRITTEN = ("diagnosis.json", "signals.json", "refitted.toml", "augmented.toml")  # beside the pictures
 
 
@@ -89,7 +88,7 @@ def diagnose(
     Raises RigError, LogError, ControllerError for files that cannot be used, InputError where ``out`` holds
     one of them, or somebody else's file, in the place of a result, FocgenError for an unknown effect.
     """
-    _check(only, bootstrap)
+    check_asked(only, bootstrap)
     each = each_of(logs)
     given = (rig, *each, controller)
     if out is not None:
@@ -98,7 +97,7 @@ def diagnose(
     which = None if controller is None else controller_from(controller)
     if which is not None:
         check_one_unit(nominal, which)
-    session = after_session(nominal, _usable(experiments(nominal, each, from_, to)))
+    session = after_session(nominal, usable(experiments(nominal, each, from_, to)))
     ran = None if which is None else check_controller(which, session)
     nominal, session = decimated(nominal, session)
     session = with_readings(session)
@@ -342,30 +341,6 @@ def _check_place(out: Path, given: Sequence[object]) -> None:
     check_writable(out, folder=True)
     check_apart((out / name for name in (*WRITTEN, NEXT)), given)
     check_own(out / name for name in (*WRITTEN, NEXT, *PICTURES))
-
-
-def _usable(logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
-    for log in logs:
-        if "output" not in log:
-            raise LogError(log.name, "has no output", "name its column in [signals]")
-        if not any(role in log for role in ("command", "pressure")):
-            raise LogError(
-                log.name, "has neither command nor pressure", "name the column of the input in [signals]"
-            )
-        bad = [role for role, values in log.signals.items() if not np.all(np.isfinite(values))]
-        if bad and bad[0] != "reference":
-            raise LogError(log.name, f"has gaps in {bad[0]}", "cut them out with --from and --to")
-    if sum(map(len, logs)) < 40:
-        raise LogError(logs[0].name, "has too few samples to diagnose", "record at least 40 samples")
-    return tuple(logs)
-
-
-def _check(only: Sequence[str] | None, bootstrap: int) -> None:
-    if bootstrap < 0 or bootstrap == 1:
-        raise InputError("bootstrap", f"is {bootstrap}", "give at least 2 sessions, or 0 for none")
-    for name in only or ():
-        if name not in EFFECTS:
-            raise FocgenError(name, "is no effect of the library", f"known: {', '.join(sorted(EFFECTS))}")
 
 
 def explain_all(
