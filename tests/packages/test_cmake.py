@@ -91,11 +91,13 @@ def test_build_files_are_the_users_to_change(tmp_path):
     assert focgen.verify(folder, 50).holds
 
 
-UNUSABLE = {
-    "[package]: is 'zephyr'": {"for": "zephyr"},
-    "[package]: belongs to --for fmu": {"for": "cmake", "fmi": 3},
-    "[package]: is 4": {"for": "fmu", "fmi": 4},
+EDITED = {
+    "[package] zephyr: is not offered": {"for": "zephyr"},
+    "[package] belongs to --for fmu": {"for": "cmake", "fmi": 3},
+    "[package] is 4": {"for": "fmu", "fmi": 4},
     "lacks 'package'": ["cmake"],
+}
+INCOMPLETE = {
     "lacks fmu/spba_fmi2.c": {"for": "fmu", "fmi": 2},
     "lacks src/spba.h": {"for": "arduino"},
 }
@@ -105,7 +107,12 @@ def test_manifests_of_packages_that_there_are_not(tmp_path, capsys):
     focgen.generate(seed_controller(9), tmp_path, "q15", for_="cmake")
     path = tmp_path / "manifest.json"
     sound = json.loads(path.read_text())
-    for says, entry in UNUSABLE.items():
+    for says, entry in EDITED.items():
+        path.write_text(json.dumps({**sound, "package": entry}))
+        assert main(["verify", str(tmp_path)]) == 1
+        said = capsys.readouterr().out
+        assert f"manifest.json: is not as it was written: {says}" in said, said
+    for says, entry in INCOMPLETE.items():
         path.write_text(json.dumps({**sound, "package": entry}))
         assert main(["verify", str(tmp_path)]) == 2
         line = capsys.readouterr().err
