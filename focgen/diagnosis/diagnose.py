@@ -167,9 +167,10 @@ def _slow(
 def _suits_what_is_slow(
     nominal: Rig, e: Explanation, ahead: Sequence[tuple[Experiment, ...]]
 ) -> tuple[Experiment, ...] | None:
-    """Of sessions with one pause or another between their logs, the one by which a slow family and no other
-    leaves least, and far less than what was found; None where there is none."""
-    least, best = NUMBERS.unlikely * e.square, None
+    """Of sessions with one pause or another between their logs, the one by which the first slow family that
+    leaves far less than what was found leaves least; None where none does."""
+    least: float = NUMBERS.unlikely * e.square
+    best: tuple[Experiment, ...] | None = None
     for name in _families(e, lambda f: f.slow):
         segment = e.segment.anew(run=run_of(ahead[0], e.segment.entry))
         found = explain(nominal, segment, ahead[0], NUMBERS.nats, [name])
@@ -178,7 +179,9 @@ def _suits_what_is_slow(
             left = float(np.mean(fit.weighed**2))
             if left < least:
                 least, best = left, logs
-    return best
+        if best is not None:
+            return best
+    return None
 
 
 def _families(e: Explanation, are: Callable[[Effect], bool]) -> list[str]:
