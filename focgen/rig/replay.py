@@ -124,9 +124,7 @@ def simulate_session(
         raise LogError(
             logs[0].name, "has neither command nor pressure throughout", "name an input in [signals]"
         )
-    clock = session_end(rig) if continues else 0.0
-    begin = min(log.start for log in logs)
-    run = run_of(logs, entry, ahead=clock if begin < clock else 0.0)
+    run = run_of(after_session(rig, logs) if continues else logs, entry)
     tap: dict[str, Array] = {}
     x = joined(logs, entry)
     first = "regulator" if entry == "command" else "actuator"

@@ -11,10 +11,9 @@ from focgen.logs.experiment import Experiment
 from focgen.rig.effects import Run
 
 
-def run_of(logs: Sequence[Experiment], entry: str, ahead: float = 0.0) -> Run:
-    """The run that the logs are, where the signal ``entry`` is its input; ``ahead``: s by which its clock is
-    later than theirs."""
-    lengths, starts = [len(log) for log in logs], [log.start + ahead for log in logs]
+def run_of(logs: Sequence[Experiment], entry: str) -> Run:
+    """The run that the logs are, where the signal ``entry`` is its input."""
+    lengths, starts = [len(log) for log in logs], [log.start for log in logs]
     begins, lasts = [log.before(entry) for log in logs], any(log.lasts for log in logs)
     stands = [0.0 if entry == "curvature" else log.stands for log in logs]
     return Run.of(lengths, starts, logs[0].sample_time, begins, lasts, stands)
