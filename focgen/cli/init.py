@@ -5,14 +5,10 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 
 from focgen.cli.outcome import Outcome
-from focgen.errors import FocgenError
-from focgen.output import write_file
 from focgen.rig.files import rig_table
-from focgen.rig.proposal import Proposal, init
-from focgen.rig.replay import experiments
+from focgen.rig.proposal import init
 from focgen.rig.rig import Rig
 from focgen.terminal import for_terminal
 
@@ -36,31 +32,11 @@ def run(args: argparse.Namespace) -> Outcome:
     """Do it."""
     asks = sys.stdin.isatty() and sys.stderr.isatty() and not args.json
     found = init(args.logs, args.out, _ask if asks else None)
-    if (refusal := _refusal(args.logs, found.rig)) is not None:
-        found = _with_doubt(found, f"the logs: {refusal}")
-        if args.out:
-            write_file(args.out, found.text, args.logs)
     doubts = [f"unsure: {doubt}" for doubt in found.doubts]
     ahead = [f"{args.out}: {_roles(found.rig)}"] if args.out else [found.text]
     text = "\n".join([*ahead, *(doubts if args.out else []), f"next: {found.next}"])
     payload = {"rig": rig_table(found.rig), "doubts": found.doubts, "text": found.text, "next": found.next}
     return Outcome(payload, text)
-
-
-def _refusal(logs: Sequence[str], rig: Rig) -> str | None:
-    """Why no command that uses the rig takes the logs it was proposed for; None where each does."""
-    try:
-        experiments(rig, logs)
-    except FocgenError as reason:
-        return str(reason)
-    return None
-
-
-def _with_doubt(found: Proposal, doubt: str) -> Proposal:
-    """The proposal with a doubt more, ahead of the others, in its text, too."""
-    head, begin, rest = found.text.partition("# unsure: ")
-    line = "".join(c if c.isprintable() else " " for c in doubt)
-    return replace(found, text=f"{head}# unsure: {line}\n{begin}{rest}", doubts=(doubt, *found.doubts))
 
 
 def _roles(rig: Rig) -> str:

@@ -14,7 +14,7 @@ import tomlkit
 
 from focgen.arguments import checked
 from focgen.arrays import Array
-from focgen.errors import LogError
+from focgen.errors import FocgenError, LogError
 from focgen.logs import clock
 from focgen.logs.columns import SIGNALS, Column, Guess, columns_of, guessed, is_dated, run_of, time_of
 from focgen.logs.read import Logs, each_of, tables_of
@@ -24,6 +24,7 @@ from focgen.logs.together import check_one_unit
 from focgen.logs.units import time_unit_named
 from focgen.output import check_apart, write_file
 from focgen.rig.files import check_replaces_rig, read_rig
+from focgen.rig.replay import experiments
 from focgen.rig.rig import Rig
 from focgen.shown import Shown
 
@@ -104,9 +105,22 @@ def init(
     told = _next(files, roles, out)
     text = _text(label, run, time, roles, guesses, doubts, told)
     rig = read_rig(tomllib.loads(text))
+    if refusal := _refusal(rig, given):
+        doubts = (refusal, *doubts)
+        text = _text(label, run, time, roles, guesses, doubts, told)
     if out is not None:
         write_file(out, text, given)
     return Proposal(rig, text, doubts, told)
+
+
+def _refusal(rig: Rig, logs: Sequence[Any]) -> str | None:
+    """Why no command that uses the rig takes the logs it was proposed for, in one line; None where each
+    does."""
+    try:
+        experiments(rig, logs)
+    except FocgenError as reason:
+        return "".join(c if c.isprintable() else " " for c in f"the logs: {reason}")
+    return None
 
 
 def _marks(tables: Sequence[LogTable], names: Sequence[str]) -> list[str]:
