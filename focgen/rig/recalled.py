@@ -1,11 +1,11 @@
 """What the experiments of a session left in the rig, where it rested too short between two to forget them.
 
 The clock of the session says how long ago each earlier experiment was, and what the input was then is in the
-logs. Between two logs it counts as 0. Where each has a clock of its own, the pause ahead of it is the one of
-several that suits the logs best. A fractional actuator forgets by a power of time only: after a rest of
-five response times its output is still off by some per cent. Experiments that are simulated in a row go on
-from one another. For one by itself the input's past is given as levels, means over windows that are the
-longer, the longer they are ago: what is left of it changes no faster.
+logs. Between two logs it counts as 0, and a signal further on is what that drives it to. Where each has a
+clock of its own, the pause ahead of it is the one of several that suits the logs best. A fractional actuator
+forgets by a power of time only: after a rest of five response times its output is still off by some per cent.
+Experiments that are simulated in a row go on from one another. For one by itself the input's past is given as
+levels, means over windows that are the longer, the longer they are ago: what is left of it changes no faster.
 
 A log that begins a sample behind the end of the last one, its output where that was, goes on from
 it: one recording was cut in two. Its past is known, whatever its input is then.
@@ -15,12 +15,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise, starmap
 
 import numpy as np
 
 from focgen.arrays import Array, Bools
 from focgen.logs.begin import Begin
 from focgen.logs.experiment import Experiment
+from focgen.rig.carried import FIRST, carried
 from focgen.rig.engine import Chain, between_of
 from focgen.rig.initial import NOTE as ESTIMATED
 from focgen.rig.placed import Placed
@@ -133,7 +135,9 @@ def recalled(
         return tuple(logs)
     past = memory(rig, logs)
     found = tuple(
-        _recalled(log, _earlier(log, logs), past, None if held is None else n in held)
+        _recalled(
+            Chain(rig, tuple(placed)), log, _earlier(log, logs), past, None if held is None else n in held
+        )
         for n, log in enumerate(logs)
     )
     if rig.integrator:  # what was put in tells where a pump stood but for what errors add up to
@@ -152,7 +156,7 @@ def all_ahead(rig: Rig, logs: Sequence[Experiment]) -> list[tuple[Experiment, ..
     response = response_time(rig, logs[0].sample_time, longest(logs))
     pauses = _PAUSES if any(log.paused for log in logs) else (0.0,)
     sessions = (_spaced(logs, pause * response) for pause in pauses)
-    return [tuple(_recalled(log, _earlier(log, s), past, False) for log in s) for s in sessions]
+    return [tuple(_recalled(Chain(rig), log, _earlier(log, s), past, False) for log in s) for s in sessions]
 
 
 def memory(rig: Rig, logs: Sequence[Experiment]) -> float:
@@ -179,13 +183,20 @@ def _moved_since(logs: Sequence[Experiment]) -> list[int]:
     return [n for n, (gap, ago) in enumerate(zip(gaps, steps)) if any(t < gap for t in ago)]
 
 
-def _recalled(log: Experiment, earlier: Sequence[Experiment], past: float, own: bool | None) -> Experiment:
+def _recalled(
+    chain: Chain, log: Experiment, earlier: Sequence[Experiment], past: float, own: bool | None
+) -> Experiment:
     """A log with its inputs' pasts; ``own``: whether one that is not known was since the last of the
-    ``earlier`` logs what its own begin tells, or where it begins; None where it is left as it is."""
+    ``earlier`` logs what its own begin tells, or where it begins; None where it is left as it is. One whose
+    driving signal's past is told was between the logs what the ``chain`` makes of that."""
     roles = [role for role in ENTERS if role in log and all(role in other for other in earlier)]
     begins = {role: begin_after(log, earlier, role, past) for role in roles if _is_known(log, earlier, role)}
     if own is not None and earlier:
         begins = {role: begins.get(role) or _held(log, earlier, role, past, own) for role in roles}
+    for ahead, role in pairwise(roles if earlier else ()):
+        drives = ahead in begins and not begins[ahead].at_rest and ENTERS[ahead] != chain.rig.integrator
+        if drives and not (role in begins and begins[role].known):
+            begins[role] = _driven(chain, log, earlier, ahead, begins[ahead], role, past)
     begins = {role: begin for role, begin in begins.items() if not begin.at_rest}
     if not begins:
         return log
@@ -205,6 +216,34 @@ def _held(log: Experiment, earlier: Sequence[Experiment], role: str, past: float
     since = [t for t in begins[-1].ago if t < begin.ago[-1]] if own else []
     levels = begins[0].levels[0], *begin.levels[1:-1], *begins[-1].levels[-1 - len(since) :]
     return Begin(levels, (*begin.ago, *since), after=begin.after)
+
+
+def _driven(
+    chain: Chain,
+    log: Experiment,
+    earlier: Sequence[Experiment],
+    ahead: str,
+    begin: Begin,
+    role: str,
+    past: float,
+) -> Begin:
+    """An input's past, had it been between any two logs what the signal ``ahead`` drives it to, whose past is
+    ``begin``, from where the one log ends to where the next one begins."""
+    made = carried(chain, log, ahead, begin, STAGES[STAGES.index(ENTERS[role]) - 1])
+    shape = made.samples(log.sample_time)[::-1]
+
+    def rest(before: Experiment, behind: Experiment) -> tuple[Array, Array]:
+        ago, _ = _rest(log, before, behind, role, past)
+        if not len(ago):
+            return ago, ago
+        driven = shape[np.minimum(np.round(ago / log.sample_time).astype(int), len(shape)) - 1]
+        start = float(np.mean(before[role][-FIRST:])) - driven[0]
+        end = float(np.mean(behind[role][:FIRST])) - driven[-1]
+        return ago, driven + np.linspace(start, end, len(ago))
+
+    told = begin_after(log, earlier, role, past, list(starmap(rest, pairwise((*earlier, log)))))
+    first, last = earlier[0].before(role).levels[0], float(np.mean(log[role][:FIRST]))
+    return Begin((first, *told.levels[1:-1], last), told.ago, after=told.after)
 
 
 def _rest(

@@ -22,7 +22,7 @@ EFFECT = Effect(
         Form(
             "delay",
             "supply",
-            (Parameter(DELAY, time=1, lower=0.0, upper=5.0, starts=(0.01, 0.05, 0.3), zero=0.0),),
+            (Parameter(DELAY, time=1, lower=0.0, upper=20.0, starts=(0.01, 0.05, 0.3, 1.5, 6.0), zero=0.0),),
             _shift,
             response=lambda values, s: np.exp(-values[0] * s),
         )
