@@ -278,6 +278,9 @@ class _Setting:
         tries = [t for t in (*further, *self.tries()) if off(t) < asked.mended and t.cost < most]
         if not tries:
             return REST
+        if ENTERS[self.entry] == self.chain.rig.integrator:  # which may have stood anywhere
+            stood = Try(REST, 1, rest.raw, self._counted(rest.raw, np.inf))
+            return likeliest([stood, *tries], asked.nats).begin
         sure = np.max(rest.first) > asked.far and min(map(off, tries)) < asked.surely
         if sure and self._offset_explains(rest, tries):
             return REST

@@ -83,6 +83,20 @@ def test_a_pump_may_be_on_its_way_as_a_log_begins(roles, first):
     assert left(rig, begun(rig, [log])) < 0.15 * left(rig, [log])
 
 
+@pytest.mark.parametrize("flow", [4.0, -3.0, 1.5])
+@pytest.mark.parametrize("roles", [("output",), ("pressure", "output")], ids=["A", "B"])
+def test_a_pump_that_starts_with_the_log_has_left_its_volume_before(roles, flow):
+    """It stood there for long: no stroke just before the log has put that in."""
+    rig, told = RIGS["whole"], []
+    flows = np.r_[np.full(60, 5.0), np.zeros(600), np.full(30, flow), np.zeros(60), np.full(40, -flow)]
+    for seed in range(8):
+        whole, made = logged(rig, roles, flows, noise=0.01, seed=seed)
+        (found,) = begun(rig, [cut(whole, 660)])
+        assert found.stands == pytest.approx(made["pressure"][660], rel=0.1)
+        told.append("command" in found.begins)
+    assert sum(told) <= 1
+
+
 @pytest.mark.parametrize("roles", SETS.values(), ids=SETS)
 def test_a_bladder_that_begins_empty_stands_at_0(roles):
     for seed in range(10):
