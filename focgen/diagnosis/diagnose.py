@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from focgen.diagnosis.fitting.predictability import predicted
 from focgen.diagnosis.hypotheses.bootstrap import threshold as bootstrapped
 from focgen.diagnosis.hypotheses.explain import (
     Explanation,
+    as_it_was,
     begun_as,
     candidates_for,
     explain,
@@ -32,6 +33,7 @@ from focgen.diagnosis.hypotheses.initial import (
     begun_with,
     held_as_fitted,
     loosened,
+    rested_long,
 )
 from focgen.diagnosis.hypotheses.input_covariance import input_covariance
 from focgen.diagnosis.model import Diagnosis
@@ -105,6 +107,7 @@ def diagnose(
     explanations = explain_all(nominal, session, NUMBERS.nats, only, bootstrap)
     nominal = explanations[0].with_intersample(nominal)
     search = _Search(nominal, only, bootstrap)
+    explanations, session = _rested(search, explanations, session)
     explanations, session = _slow(search, explanations, session)
     explanations, session = _told_by_another(search, explanations, session)
     explanations, session = _lasting(search, explanations, session)
@@ -144,6 +147,20 @@ class _Search:
         """The findings of the session as it is now, where they leave less than those so far."""
         again = explain_all(self.nominal, session, NUMBERS.nats, self.only, self.bootstrap)
         return again if _left_by(again) < _left_by(explanations) else None
+
+
+def _rested(
+    search: _Search, explanations: tuple[Explanation, ...], session: tuple[Experiment, ...]
+) -> tuple[tuple[Explanation, ...], tuple[Experiment, ...]]:
+    """The findings and the session, made anew as if the rig had rested for long ahead of every log, where no
+    clock says for how long and that suits what was found better: without an effect, a zero that drifts looks
+    like a rest that was too short."""
+    rested, found = rested_long(session), search.only is None and any(e.causes for e in explanations)
+    if not (found and _begin_elsewise(rested, session)) or _nats_gained(explanations, rested) < NUMBERS.nats:
+        return explanations, session
+    step("a long rest ahead of every log")
+    again = search.better(explanations, rested)
+    return (again, rested) if again else (explanations, session)
 
 
 def _slow(
@@ -309,17 +326,19 @@ def _carried(
     carried = compose.carried_on(rigs, session)
     if _begin_elsewise(carried, session):
         return carried
-    return compose.held_on(rigs, session, partial(_square_left, explanations))
+    known = cache(lambda: [as_it_was(e) for e in explanations])
+
+    def left(logs: Sequence[Experiment]) -> float:
+        """The mean square that a refit leaves, of what was left before, as if of all samples alike."""
+        nats = sum(gained(e, logs, of) for e, of in zip(explanations, known()))
+        return float(np.exp(-2.0 * nats / sum(map(len, logs))))
+
+    return compose.held_on(rigs, session, left)
 
 
 def _nats_gained(explanations: Sequence[Explanation], logs: Sequence[Experiment]) -> float:
-    """What explanations gain by a refit where their experiments begin as in ``logs``."""
+    """What explanations gain by a refit where their experiments begin as in ``logs``, nats."""
     return sum(gained(e, logs) for e in explanations)
-
-
-def _square_left(explanations: Sequence[Explanation], logs: Sequence[Experiment]) -> float:
-    """The mean square that such a refit leaves, of what was left before, as if of all samples alike."""
-    return float(np.exp(-2.0 * _nats_gained(explanations, logs) / sum(map(len, logs))))
 
 
 def _begin_elsewise(logs: Sequence[Experiment], session: Sequence[Experiment]) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from focgen.diagnosis.fitting.fit import Fit, Weighing, fit
+from focgen.diagnosis.fitting.fit import Fit, Known, Weighing, fit
 from focgen.diagnosis.hypotheses.nuisances import ways
 from focgen.diagnosis.hypotheses.rivals import Rival
 from focgen.diagnosis.numbers import NUMBERS
@@ -30,12 +30,12 @@ def between_anew(rig: Rig, best: Fit, nominal: Fit, weighing: Weighing) -> tuple
     return closest, moved_to(nominal, closest.problem.segment, weighing)
 
 
-def moved_to(of: Fit, segment: Segment, weighing: Weighing) -> Fit:
-    """A fit made anew to another account of its segment."""
+def moved_to(of: Fit, segment: Segment, weighing: Weighing, known: Known | None = None) -> Fit:
+    """A fit made anew to another account of its segment; ``known``: its Jacobian, taken as it was."""
     problem = replace(of.problem, segment=segment, memory={})
     start = of.vector.copy()
     start[len(problem.nominal_start)] = 0.0  # the alignment made up for the wrong way
-    return fit(problem, start, weighing, 8)
+    return fit(problem, start, weighing, 8, known=known)
 
 
 def in_the_end(rivals: Sequence[Rival], found: Fit, best: Fit, weighing: Weighing) -> tuple[Rival, ...]:

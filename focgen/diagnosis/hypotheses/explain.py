@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from focgen.diagnosis.fitting.fit import WHITE, Fit, Weighing, fit
+from focgen.diagnosis.fitting.fit import WHITE, Fit, Known, Weighing, fit, innovations, jacobian
 from focgen.diagnosis.fitting.integrating import settled
 from focgen.diagnosis.fitting.predictability import Predictability, predictability
 from focgen.diagnosis.fitting.realign import realigned
@@ -267,9 +267,18 @@ def begun_as(of: Explanation, fit: Fit, logs: Sequence[Experiment]) -> Fit:
     return moved_to(fit, segment, Weighing(of.ar))
 
 
-def gained(of: Explanation, logs: Sequence[Experiment]) -> float:
-    """Nats that an explanation gains, its numbers fitted anew, where its experiments begin as in ``logs``."""
-    return evidence(begun_as(of, of.best, logs), of.best)
+def gained(of: Explanation, logs: Sequence[Experiment], known: Known | None = None) -> float:
+    """Nats that an explanation gains, its numbers fitted anew, where its experiments begin as in ``logs``;
+    ``known``: the fit's Jacobian, taken as it was, for many sessions to be compared by."""
+    segment = of.best.problem.segment.anew(run=run_of(logs, of.segment.entry))
+    return evidence(moved_to(of.best, segment, Weighing(of.ar), known), of.best)
+
+
+def as_it_was(of: Explanation) -> Known:
+    """The Jacobian of what was found."""
+    best, weighing = of.best, Weighing(of.ar)
+    now = innovations(best.problem, best.vector, weighing)
+    return Known.of(jacobian(best.problem, best.vector, now, weighing, *best.problem.bounds())[:-1])
 
 
 def remembering(of: Explanation) -> Explanation | None:

@@ -24,7 +24,7 @@ from focgen.rig.effects import Run
 from focgen.rig.engine import Chain
 from focgen.rig.initial import begun
 from focgen.rig.placed import Placed
-from focgen.rig.recalled import begin_after, ended, memory, with_earlier
+from focgen.rig.recalled import NOTE, begin_after, ended, memory, with_earlier
 from focgen.rig.rig import Rig
 
 _AGAIN = 2  # times that the rig is refitted and the begins told anew
@@ -65,6 +65,18 @@ def begun_with(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment]) -
     """The experiments with their begins told anew by the rig with the effects ``placed`` in it; a session at
     rest as it is."""
     return begun(rig, logs, placed) if any(log.begins or log.stands for log in logs) else tuple(logs)
+
+
+def rested_long(logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
+    """The experiments, each whose past is told by earlier ones at rest instead, where no clock says how long
+    ago those were."""
+
+    def rested(log: Experiment) -> Experiment:
+        if not log.paused or all(begin.after is None for begin in log.begins.values()):
+            return log
+        return replace(log, begins={}, notes=tuple(n for n in log.notes if n != NOTE))
+
+    return tuple(map(rested, logs))
 
 
 def held_as_fitted(of: Fit, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
