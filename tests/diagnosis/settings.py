@@ -22,7 +22,7 @@ CONSTANTS = {
     "hypotheses/input_covariance.py": ["_FLAT"],
     "hypotheses/converter.py": ["_EASED", "_PINNED"],
     "hypotheses/disturbance.py": ["SLOWEST"],
-    "hypotheses/explain.py": ["_BELIEVED", "_KEPT"],
+    "hypotheses/explain.py": ["_BELIEVED", "_HELD", "_KEPT"],
     "hypotheses/initial.py": ["_EXACT", "_LEVEL", "_REST", "_SEEN", "_SHOWN", "_SURE"],
     "hypotheses/left.py": ["_ERRORS", "_OFF", "_STILL"],
     "hypotheses/level_pace.py": ["_PART"],

@@ -38,7 +38,8 @@ from focgen.rig.session import run_of
 
 _DEPTH = 4
 _KEPT = 10.0  # times the pace at which a rig that integrates is searched where that shows nothing: of a small
-# force the path shows more above the sensor's noise the longer it is kept
+# force the path shows more above the sensor's noise the longer it is kept,
+_HELD = 100.0  # and a pump's first: it adds up without further errors
 _BELIEVED = 6.0  # uncertainties that a number may be off beside an effect: beyond, something else is missing
 
 
@@ -179,11 +180,12 @@ def explain(
     """
     problem = uncertain(rig, segment, logs)
     found = _explained(rig, problem, threshold, only, unsure)
-    if problem.segment.pace and not found.causes:
-        segment = replace(problem.segment, pace=_KEPT * problem.segment.pace)
-        kept = replace(problem, segment=segment, memory={})
-        other = _explained(rig, kept, threshold, only, unsure)
-        problem, found = (kept, other) if _borne_out(other, found) else (problem, found)
+    for longer in _longer(rig, problem.segment):
+        if not found.causes:
+            path = replace(problem.segment, pace=longer * problem.segment.pace)
+            kept = replace(problem, segment=path, memory={})
+            other = _explained(rig, kept, threshold, only, unsure)
+            problem, found = (kept, other) if _borne_out(other, found) else (problem, found)
     if not found.strained or problem.nominals.far or found.predictability.share < NUMBERS.left:
         return found
     freed, asked = (
@@ -195,6 +197,13 @@ def explain(
         return found
     other = _explained(rig, freed, threshold, only, unsure)
     return other if other.square < asked else found
+
+
+def _longer(rig: Rig, segment: Segment) -> tuple[float, ...]:
+    """Times the pace at which a segment is searched where that shows nothing."""
+    if not segment.pace:
+        return ()
+    return (_HELD, _KEPT) if rig.integrator == "regulator" else (_KEPT,)
 
 
 def _borne_out(kept: Explanation, usual: Explanation) -> bool:
