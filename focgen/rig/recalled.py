@@ -13,7 +13,7 @@ it: one recording was cut in two. Its past is known, whatever its input is then.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, starmap
 
@@ -133,11 +133,9 @@ def recalled(
     once = rig.integrator == "regulator" and integrations(rig) == 1
     if len(logs) < 2 or not all(map(len, logs)) or ((integrations(rig) or rig.integrator) and not once):
         return tuple(logs)
-    past = memory(rig, logs)
+    past, chain = memory(rig, logs), Chain(rig, tuple(placed))
     found = tuple(
-        _recalled(
-            Chain(rig, tuple(placed)), log, _earlier(log, logs), past, None if held is None else n in held
-        )
+        _recalled(chain, log, _earlier(log, logs), past, None if held is None else n in held)
         for n, log in enumerate(logs)
     )
     if rig.integrator:  # what was put in tells where a pump stood but for what errors add up to
@@ -153,10 +151,10 @@ def all_ahead(rig: Rig, logs: Sequence[Experiment]) -> list[tuple[Experiment, ..
     if len(logs) < 2 or integrations(rig) or rig.integrator:
         return []
     past = max(memory(rig, logs), sum(len(log) * log.sample_time for log in logs))
-    response = response_time(rig, logs[0].sample_time, longest(logs))
+    response, chain = response_time(rig, logs[0].sample_time, longest(logs)), Chain(rig)
     pauses = _PAUSES if any(log.paused for log in logs) else (0.0,)
     sessions = (_spaced(logs, pause * response) for pause in pauses)
-    return [tuple(_recalled(Chain(rig), log, _earlier(log, s), past, False) for log in s) for s in sessions]
+    return [tuple(_recalled(chain, log, _earlier(log, s), past, False) for log in s) for s in sessions]
 
 
 def memory(rig: Rig, logs: Sequence[Experiment]) -> float:
@@ -190,18 +188,24 @@ def _recalled(
     ``earlier`` logs what its own begin tells, or where it begins; None where it is left as it is. One whose
     driving signal's past is told was between the logs what the ``chain`` makes of that."""
     roles = [role for role in ENTERS if role in log and all(role in other for other in earlier)]
-    begins = {role: begin_after(log, earlier, role, past) for role in roles if _is_known(log, earlier, role)}
-    if own is not None and earlier:
-        begins = {role: begins.get(role) or _held(log, earlier, role, past, own) for role in roles}
-    for ahead, role in pairwise(roles if earlier else ()):
-        drives = ahead in begins and not begins[ahead].at_rest and ENTERS[ahead] != chain.rig.integrator
-        if drives and not (role in begins and begins[role].known):
-            begins[role] = _driven(chain, log, earlier, ahead, begins[ahead], role, past)
+    begins: dict[str, Begin] = {}
+    for ahead, role in zip((None, *roles), roles):
+        told = begin_after(log, earlier, role, past) if _is_known(log, earlier, role) else None
+        if earlier and not (told and told.known) and ahead and _drives(chain, ahead, begins):
+            told = _driven(chain, log, earlier, ahead, begins[ahead], role, past)
+        elif earlier and told is None and own is not None:
+            told = _held(log, earlier, role, past, own)
+        begins |= {role: told} if told else {}
     begins = {role: begin for role, begin in begins.items() if not begin.at_rest}
     if not begins:
         return log
     notes = (note for note in log.notes if note != ESTIMATED)
     return replace(log, begins=begins, notes=(*notes, NOTE))
+
+
+def _drives(chain: Chain, ahead: str, begins: Mapping[str, Begin]) -> bool:
+    """Whether the signal ``ahead`` is told, was not always 0, and does not add up in the stage behind it."""
+    return ahead in begins and not begins[ahead].at_rest and ENTERS[ahead] != chain.rig.integrator
 
 
 def _held(log: Experiment, earlier: Sequence[Experiment], role: str, past: float, own: bool) -> Begin:
@@ -211,7 +215,8 @@ def _held(log: Experiment, earlier: Sequence[Experiment], role: str, past: float
     if log.start - max(map(ended, earlier)) > past:
         return begins[-1]
     behind = (*earlier[1:],) if own else (*earlier[1:], log)
-    rests = [_rest(log, a, b, role, past) for a, b in zip(earlier, behind)]
+    gaps = [_gap(log, a, b, past) for a, b in zip(earlier, behind)]
+    rests = [(ago, np.full(len(ago), b.before(role).levels[-1])) for ago, b in zip(gaps, behind)]
     begin = begin_after(log, earlier, role, past, rests)
     since = [t for t in begins[-1].ago if t < begin.ago[-1]] if own else []
     levels = begins[0].levels[0], *begin.levels[1:-1], *begins[-1].levels[-1 - len(since) :]
@@ -233,7 +238,7 @@ def _driven(
     shape = made.samples(log.sample_time)[::-1]
 
     def rest(before: Experiment, behind: Experiment) -> tuple[Array, Array]:
-        ago, _ = _rest(log, before, behind, role, past)
+        ago = _gap(log, before, behind, past)
         if not len(ago):
             return ago, ago
         driven = shape[np.minimum(np.round(ago / log.sample_time).astype(int), len(shape)) - 1]
@@ -246,15 +251,11 @@ def _driven(
     return Begin((first, *told.levels[1:-1], last), told.ago, after=told.after)
 
 
-def _rest(
-    log: Experiment, before: Experiment, behind: Experiment, role: str, past: float
-) -> tuple[Array, Array]:
-    """How long before a ``log``, s, up to ``past``, the samples would have been between two others, and what
-    they are where the input was then what it is as the later one begins."""
+def _gap(log: Experiment, before: Experiment, behind: Experiment, past: float) -> Array:
+    """How long before a ``log``, s, up to ``past``, the samples (n,) would have been between two others."""
     h = log.sample_time
     first = min(log.start - ended(before) - h, past)
-    ago = np.arange(first, log.start - behind.start + 0.5 * h, -h)
-    return ago, np.full(len(ago), behind.before(role).levels[-1])
+    return np.arange(first, log.start - behind.start + 0.5 * h, -h)
 
 
 def _is_known(log: Experiment, earlier: Sequence[Experiment], role: str) -> bool:

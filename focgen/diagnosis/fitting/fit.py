@@ -214,6 +214,12 @@ def jacobian(
     return rows
 
 
+def known_at(problem: Problem, vector: np.ndarray, weighing: Weighing) -> tuple[np.ndarray, Known]:
+    """The innovations at a vector, and the Jacobian there, for quick fits that take it as it is."""
+    now = innovations(problem, vector, weighing)
+    return now, Known.of(jacobian(problem, vector, now, weighing, *problem.bounds())[:-1])
+
+
 def _step(
     normal: np.ndarray,
     slope: np.ndarray,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from focgen.diagnosis.fitting.fit import WHITE, Fit, Known, Weighing, fit, innovations, jacobian
+from focgen.diagnosis.fitting.fit import WHITE, Fit, Known, Weighing, fit, known_at
 from focgen.diagnosis.fitting.integrating import settled
 from focgen.diagnosis.fitting.predictability import Predictability, predictability
 from focgen.diagnosis.fitting.realign import realigned
@@ -39,7 +39,7 @@ from focgen.rig.session import run_of
 _DEPTH = 4
 _KEPT = 10.0  # times the pace at which a rig that integrates is searched where that shows nothing: of a small
 # force the path shows more above the sensor's noise the longer it is kept,
-_HELD = 100.0  # and a pump's first: it adds up without further errors
+_HELD = 100.0  # and a pump's for so long first: it adds up without further errors
 _BELIEVED = 6.0  # uncertainties that a number may be off beside an effect: beyond, something else is missing
 
 
@@ -270,24 +270,23 @@ def _off_by_itself(e: Explanation, off: Examined | None) -> Explanation:
     return replace(e, whole=replace(e, best=off.best, causes=off.causes, predictability=with_it))
 
 
-def begun_as(of: Explanation, fit: Fit, logs: Sequence[Experiment]) -> Fit:
-    """A fit of an explained segment, made anew where its experiments begin as in ``logs``."""
+def begun_as(of: Explanation, fit: Fit, logs: Sequence[Experiment], known: Known | None = None) -> Fit:
+    """A fit of an explained segment, made anew where its experiments begin as in ``logs``; ``known``: its
+    Jacobian, taken as it was, for many sessions to be compared by."""
     segment = fit.problem.segment.anew(run=run_of(logs, of.segment.entry))
-    return moved_to(fit, segment, Weighing(of.ar))
+    return moved_to(fit, segment, Weighing(of.ar), known)
 
 
 def gained(of: Explanation, logs: Sequence[Experiment], known: Known | None = None) -> float:
     """Nats that an explanation gains, its numbers fitted anew, where its experiments begin as in ``logs``;
-    ``known``: the fit's Jacobian, taken as it was, for many sessions to be compared by."""
-    segment = of.best.problem.segment.anew(run=run_of(logs, of.segment.entry))
-    return evidence(moved_to(of.best, segment, Weighing(of.ar), known), of.best)
+    ``known``: as of :func:`begun_as`."""
+    return evidence(begun_as(of, of.best, logs, known), of.best)
 
 
 def as_it_was(of: Explanation) -> Known:
     """The Jacobian of what was found."""
-    best, weighing = of.best, Weighing(of.ar)
-    now = innovations(best.problem, best.vector, weighing)
-    return Known.of(jacobian(best.problem, best.vector, now, weighing, *best.problem.bounds())[:-1])
+    _, known = known_at(of.best.problem, of.best.vector, Weighing(of.ar))
+    return known
 
 
 def remembering(of: Explanation) -> Explanation | None:

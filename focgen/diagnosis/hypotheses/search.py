@@ -10,7 +10,7 @@ import numpy as np
 
 from focgen.diagnosis.belief.choice import foremost_forms
 from focgen.diagnosis.belief.further import Ground, Surroundings
-from focgen.diagnosis.fitting.fit import WHITE, Fit, Known, Weighing, fit, innovations, jacobian
+from focgen.diagnosis.fitting.fit import WHITE, Fit, Known, Weighing, fit, innovations, known_at
 from focgen.diagnosis.fitting.jumps import by_trying
 from focgen.diagnosis.fitting.noise import fit_ar
 from focgen.diagnosis.fitting.repeats import without_hearsay
@@ -257,8 +257,7 @@ def footings(problem: Problem, base: np.ndarray) -> list[Footing]:
 
 
 def _footing(problem: Problem, vector: np.ndarray, first: int) -> Footing:
-    now = innovations(problem, vector, WHITE)
-    known = Known.of(jacobian(problem, vector, now, WHITE, *problem.bounds())[:-1])
+    now, known = known_at(problem, vector, WHITE)
     return Footing(vector, now, known, first)
 
 
