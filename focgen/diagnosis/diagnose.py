@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
@@ -36,6 +36,7 @@ from focgen.diagnosis.hypotheses.initial import (
     rested_long,
 )
 from focgen.diagnosis.hypotheses.input_covariance import input_covariance
+from focgen.diagnosis.hypotheses.slow import families_in, suits_what_is_slow
 from focgen.diagnosis.model import Diagnosis
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.decimate import decimated
@@ -53,7 +54,6 @@ from focgen.output import check_apart, check_writable
 from focgen.progress import step
 from focgen.replaced import check_own
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
-from focgen.rig.effects import Effect, library
 from focgen.rig.initial import in_windows
 from focgen.rig.plausibility import doubts
 from focgen.rig.recalled import all_ahead
@@ -174,36 +174,11 @@ def _slow(
     for e in explanations:
         if not e.causes and e.predictability.share <= NUMBERS.left:
             continue
-        if (logs := _suits_what_is_slow(search.nominal, e, ahead)) is not None:
+        if (logs := suits_what_is_slow(search.nominal, e, ahead)) is not None:
             step("what is slow, from log to log")
             again = search.better(explanations, logs)
             return (again, logs) if again else (explanations, session)
     return explanations, session
-
-
-def _suits_what_is_slow(
-    nominal: Rig, e: Explanation, ahead: Sequence[tuple[Experiment, ...]]
-) -> tuple[Experiment, ...] | None:
-    """Of sessions with one pause or another between their logs, the one by which the first slow family that
-    leaves far less than what was found leaves least; None where none does."""
-    least: float = NUMBERS.unlikely * e.square
-    best: tuple[Experiment, ...] | None = None
-    for name in _families(e, lambda f: f.slow):
-        segment = e.segment.anew(run=run_of(ahead[0], e.segment.entry))
-        found = explain(nominal, segment, ahead[0], NUMBERS.nats, [name])
-        for logs in ahead:
-            fit = found.best if logs is ahead[0] else begun_as(found, found.best, logs)
-            left = float(np.mean(fit.weighed**2))
-            if left < least:
-                least, best = left, logs
-        if best is not None:
-            return best
-    return None
-
-
-def _families(e: Explanation, are: Callable[[Effect], bool]) -> list[str]:
-    """The families that ``are`` of a kind, and may act in an explained segment."""
-    return [n for n, family in library().items() if are(family) and family.stage in e.segment.stages]
 
 
 def _leaves_less(
@@ -291,7 +266,7 @@ def _remembers(search: _Search, e: Explanation, lasting: Sequence[Experiment]) -
     wanders = any(candidate.form.wanders for candidate in e.best.problem.candidates)
     if search.only is not None or not (wanders or e.predictability.share > NUMBERS.left):
         return False
-    found, others = e.best.problem.families, _families(e, lambda f: f.remembers)
+    found, others = e.best.problem.families, families_in(e, lambda f: f.remembers)
     beside = dict.fromkeys(
         tuple(sorted({*found, name})) for name in others
     )  # one that was found adds nothing

@@ -8,7 +8,7 @@ pause between them: what that one leaves is there already.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -21,20 +21,18 @@ from focgen.rig.kernels import BALANCED
 _ALIKE = 2.0  # samples: a log in means of several ends and begins within one of its own
 _SLACK = 1e-6  # samples, or of a signal: rounding of a clock, and of means
 _WIDER = 1.1  # times as long ago as it is, the earliest window of a past may begin
-_EXTENDED: WeakKeyDictionary[Run, tuple[Run, Array]] = WeakKeyDictionary()
 
 
 def with_past(x: Array, run: Run) -> Array:
     """The input (n,) of a run with what was before each experiment ahead of it."""
-    parts, made, before = _parts(x, run), [], 0.0
-    for begin, gap, part in zip(run.begins, _gaps(run), parts):
-        past = _past(begin, gap, run.h)
+    made, before = [], 0.0
+    for (past, lasts), (first, last) in zip(_told(run).pasts, run.spans):
         # the last level lasts for what a pause has less than whole samples
-        lasts = 0.0 if gap is None else len(past) + 1 - gap / run.h
         if lasts > _SLACK and len(past):
+            past = past.copy()
             past[0] += lasts * (before - past[0])
-        made += [past, part]
-        before = part[-1]
+        made += [past, x[first:last]]
+        before = x[last - 1]
     return np.concatenate(made)
 
 
@@ -46,15 +44,35 @@ def from_there(x: Array, run: Run) -> Array:
 
 def past_of(run: Run) -> tuple[Run, Array]:
     """The run with the pasts of its experiments, and where (n,) the samples of the experiments are in it."""
-    found = _EXTENDED.get(run)
+    told = _told(run)
+    return told.whole, told.kept
+
+
+@dataclass(frozen=True, eq=False)
+class _Told:
+    """A run's pasts: each with by how much of a sample its pause ends sooner, 0 where it is none; the
+    ``whole`` run with them, and where (n,) the samples of the experiments are in it."""
+
+    pasts: tuple[tuple[Array, float], ...]
+    whole: Run
+    kept: Array
+
+
+_TOLD: WeakKeyDictionary[Run, _Told] = WeakKeyDictionary()
+
+
+def _told(run: Run) -> _Told:
+    """Told once for each run: fits simulate it again and again."""
+    found = _TOLD.get(run)
     if found is None:
-        found = _EXTENDED[run] = _extended(run)
+        found = _TOLD[run] = _tell(run)
     return found
 
 
-def _extended(run: Run) -> tuple[Run, Array]:
+def _tell(run: Run) -> _Told:
     gaps, h = _gaps(run), run.h
     pasts = [_past(begin, gap, h) for begin, gap in zip(run.begins, gaps)]
+    sooner = [0.0 if gap is None else len(past) + 1 - gap / h for past, gap in zip(pasts, gaps)]
     lengths = [b - a for a, b in run.spans]
     whole = [len(past) + length for past, length in zip(pasts, lengths)]
     starts = np.cumsum([0, *whole[:-1]])
@@ -62,14 +80,14 @@ def _extended(run: Run) -> tuple[Run, Array]:
     rest[starts] = [_rests(begin, gap) for begin, gap in zip(run.begins, gaps)]
     clock = [
         part
-        for past, t in zip(pasts, _parts(run.clock, run))
-        for part in (t[0] - h * np.arange(len(past), 0, -1), t)
+        for past, (a, b) in zip(pasts, run.spans)
+        for part in (run.clock[a] - h * np.arange(len(past), 0, -1), run.clock[a:b])
     ]
     kept = [s + len(past) + np.arange(n) for s, past, n in zip(starts, pasts, lengths)]
     stands = tuple(place for place, gap in zip(run.stands, gaps) if gap is None)
     long = replace(run, rest=rest, clock=np.concatenate(clock), begins=(), stands=stands)
     duration = max(run.duration, h * max(b - a for a, b in long.spans))
-    return replace(long, duration=duration), np.concatenate(kept)
+    return _Told(tuple(zip(pasts, sooner)), replace(long, duration=duration), np.concatenate(kept))
 
 
 def _gaps(run: Run) -> list[float | None]:
@@ -105,7 +123,3 @@ def _past(begin: Begin, gap: float | None, h: float) -> Array:
     if gap is not None:
         return np.full(max(int(np.ceil(gap / h - _SLACK)) - 1, 0), begin.levels[-1])
     return np.zeros(0) if begin == REST else begin.samples(h)
-
-
-def _parts(signal: Array, run: Run) -> list[Array]:
-    return [signal[a:b] for a, b in run.spans]

@@ -306,6 +306,20 @@ void focgen_bouc_wen(int n, const double *x, double *y, const unsigned char *res
     }
 }
 
+/* A spline of `pieces` cubics over as many even parts of 0 to 1, and level beyond: rows of c (4, pieces), the highest power first, in
+ * the distance from where a part begins. What is no number stays none. */
+void focgen_spline(int n, const double *x, double *y, const unsigned char *rest, int pieces, const double *c)
+{
+    (void)rest; /* a curve knows no past */
+    for (int k = 0; k < n; k++) {
+        double q = x[k] > 1.0 ? 1.0 : x[k], along = q * pieces;
+        int part = along >= 1.0 ? (along < pieces ? (int)along : pieces - 1) : 0;
+        const double *own = c + part;
+        double from = q - (double)part / pieces;
+        y[k] = ((own[0] * from + own[pieces]) * from + own[2 * pieces]) * from + own[3 * pieces];
+    }
+}
+
 /* (1 + u)^-n: of what is little, as most is from sample to sample, by the binomial series, to 1e-12. */
 static double lessened(double u, double n)
 {

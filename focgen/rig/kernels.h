@@ -22,6 +22,8 @@ void focgen_pressed(int n, const double *x, double *y, const unsigned char *rest
 void focgen_stick(int n, const double *x, double *y, const unsigned char *rest, double band, double
     left, int anew, double place);
 void focgen_bouc_wen(int n, const double *x, double *y, const unsigned char *rest, double width);
+void focgen_spline(int n, const double *x, double *y, const unsigned char *rest, int pieces, const double
+    *c);
 void focgen_power_creep(int n, const double *x, double *y, const unsigned char *rest, double h, double tau,
     double scale, double power);
 void focgen_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double *b,

@@ -22,6 +22,7 @@ from focgen.errors import BuildError
 from focgen.scratch import temporary_folder
 
 BALANCED = 2
+_NEVER = np.zeros(1, np.uint8)  # of what has no past
 _AT_ONCE = 1024  # samples that a compiled loop looks at many times: AT_ONCE in ``kernels.c``
 _REGISTERS = 3  # a filter of order 2 is the quickest: one of order 1 is run as such
 _SOURCES = [
@@ -173,6 +174,11 @@ def bouc_wen(x: Array, rest: Bytes, width: float) -> Array:
     """Bouc–Wen's hysteretic variable in [−1, 1], of power 1 and as stiff wherever it unloads; ``width`` is
     the input's travel to reverse it, units of x."""
     return _call("focgen_bouc_wen", x, rest, float(width))
+
+
+def spline(x: Array, c: Array) -> Array:
+    """A spline over even parts of 0 to 1, level beyond, at ``x`` (n,); ``c`` (4, parts) as scipy has it."""
+    return _call("focgen_spline", x, _NEVER, c.shape[1], *_doubles(c))
 
 
 def power_creep(x: Array, rest: Bytes, h: float, tau: float, scale: float, power: float) -> Array:

@@ -6,6 +6,7 @@ import cmath
 import math
 from collections.abc import Sequence
 from functools import lru_cache
+from itertools import combinations
 
 import numpy as np
 
@@ -324,8 +325,12 @@ def _by_pulse(
 
 def coincide(poles: Complex) -> bool:
     """Whether two poles are so close that their residues would cancel."""
-    distance = np.abs(poles[:, None] - poles[None, :]) + np.diag(np.full(len(poles), np.inf))
-    return bool(np.any(distance < 1e-3 * np.maximum(np.abs(poles)[:, None], 1e-12)))
+    pairs = combinations(poles.tolist(), 2)
+    return any(_size(a - b) < 1e-3 * max(_size(a), _size(b), 1e-12) for a, b in pairs)
+
+
+def _size(pole: complex) -> float:
+    return math.hypot(pole.real, pole.imag)
 
 
 def _by_exponential(num: Array, den: Array, h: float, held: bool) -> tuple[Array, Array]:

@@ -280,8 +280,14 @@ class Problem:
     def _parted(self, nuisances: np.ndarray) -> tuple[np.ndarray, ...]:
         """The nuisances behind the alignment: of gauges, of the input's ways, of begins, of zeros, and of
         what a pump held."""
+        return tuple(nuisances[first:last] for first, last in self._parts)
+
+    @cached_property
+    def _parts(self) -> tuple[tuple[int, int], ...]:
+        """First and last of each part."""
         ways = self.segment.input_modes.shape[1]
-        return tuple(np.split(nuisances, np.cumsum([len(self.gauges), ways, self.ways - ways, self.zeros])))
+        ends = np.cumsum([0, len(self.gauges), ways, self.ways - ways, self.zeros, self.stood])
+        return tuple(pairwise(ends.tolist()))
 
     def _begun(self, stood: np.ndarray) -> Run:
         """The run, with what a pump held as each experiment began off by so many standard deviations."""

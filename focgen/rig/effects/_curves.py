@@ -7,6 +7,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from focgen.arrays import Array
+from focgen.rig import kernels
 from focgen.rig.effects._effect import LARGEST, Act, Form, Parameter, Run, Values
 
 _BEYOND = 1.2  # of the largest level seen: the bend grows no further there
@@ -54,15 +55,8 @@ def _cardinal() -> CubicSpline:
 
 def _bend(place: Array, sizes: Sequence[float]) -> Array:
     """The spline through ``sizes`` at the knots beyond zero; level beyond the last."""
-    c = np.tensordot(_cardinal().c, np.asarray(sizes), axes=1)
-    place = np.minimum(place, _KNOTS[-1])
     # a plant that a fit has driven apart gives NaN, which stays NaN: such a trial is worse than any
-    knot = np.nan_to_num(place * (len(_KNOTS) - 1))
-    piece = np.clip(knot.astype(int), 0, len(_KNOTS) - 2)
-    q = place - _KNOTS[piece]
-    a, b, slope, start = (row[piece] for row in c)
-    made: Array = ((a * q + b) * q + slope) * q + start
-    return made
+    return kernels.spline(place, np.tensordot(_cardinal().c, np.asarray(sizes), axes=1))
 
 
 def _level(x: Array, run: Run) -> Array:

@@ -108,12 +108,20 @@ class Run:
     def held(self, x: Array) -> Run:
         """The run behind what remembers, whose input is ``x`` (n,): a later experiment that begins with an
         input of 0 begins in equilibrium with what that makes of it."""
-        if self.stands:
+        later = self._later_from_rest
+        if self.stands or not len(later):
             return self
-        rest, still = self.rest.copy(), _STILL * float(np.max(np.abs(x), initial=0.0))
-        later = np.flatnonzero(rest)[1:]
-        rest[later[(rest[later] == 1) & (np.abs(x[later]) <= still)]] = 2
+        still = _STILL * max(float(x.max(initial=0.0)), -float(x.min(initial=0.0)))
+        rest = self.rest.copy()
+        rest[later[np.abs(x[later]) <= still]] = 2
         return replace(self, rest=rest)
+
+    @cached_property
+    def _later_from_rest(self) -> Array:
+        """First samples of the later experiments at which the rig comes from rest at 0."""
+        firsts = np.flatnonzero(self.rest)
+        later: Array = firsts[1:][self.rest[firsts[1:]] == 1]
+        return later
 
     @cached_property
     def stood(self) -> Run:
@@ -129,11 +137,11 @@ class Run:
         stands = self.stands or (0.0,) * len(self.spans)
         return [(a, b, stood) for (a, b), stood in zip(self.spans, stands)]
 
-    @property
-    def spans(self) -> list[tuple[int, int]]:
+    @cached_property
+    def spans(self) -> tuple[tuple[int, int], ...]:
         """First sample and the one after the last, by experiment."""
         firsts = np.flatnonzero(self.rest).tolist()
-        return list(zip(firsts, [*firsts[1:], len(self.rest)]))
+        return tuple(zip(firsts, [*firsts[1:], len(self.rest)]))
 
     @classmethod
     def of(

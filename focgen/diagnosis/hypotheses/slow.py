@@ -1,0 +1,58 @@
+"""What is slow, from log to log: a creep, or a reading that relaxes, that the earlier logs left in the later
+ones. Where every log is taken to begin at rest it is lost to a drift."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from focgen.diagnosis.fitting.fit import Fit
+from focgen.diagnosis.hypotheses.explain import Explanation, begun_as, candidates_for, explain
+from focgen.diagnosis.hypotheses.nuisances import uncertain
+from focgen.diagnosis.hypotheses.search import likeliest_on_all
+from focgen.diagnosis.numbers import NUMBERS
+from focgen.logs.experiment import Experiment
+from focgen.rig.effects import Effect, library
+from focgen.rig.rig import Rig
+from focgen.rig.session import run_of
+
+Ahead = Sequence[tuple[Experiment, ...]]
+"""A session with all earlier logs ahead of every log, by one pause between them or another."""
+
+
+def families_in(e: Explanation, are: Callable[[Effect], bool]) -> list[str]:
+    """The families that ``are`` of a kind, and may act in an explained segment."""
+    return [n for n, family in library().items() if are(family) and family.stage in e.segment.stages]
+
+
+def suits_what_is_slow(nominal: Rig, e: Explanation, ahead: Ahead) -> tuple[Experiment, ...] | None:
+    """Of the sessions ``ahead``, the one by which the first slow family that leaves far less than what was
+    found leaves least; None where none does. Families are searched in earnest where their likeliest form
+    comes near to that by itself."""
+    least: float = NUMBERS.unlikely * e.square
+    for name in families_in(e, lambda f: f.slow):
+        if e.best.problem.families == (name,):  # what it left in later logs is asked of what was found
+            continue
+        roughly = _likeliest(nominal, e, ahead, name)
+        if roughly is None or min(_left(e, roughly, ahead)) > e.square / NUMBERS.unlikely:
+            continue
+        segment = e.segment.anew(run=run_of(ahead[0], e.segment.entry))
+        found = explain(nominal, segment, ahead[0], NUMBERS.nats, [name])
+        left = _left(found, found.best, ahead)
+        if min(left) < least:
+            return ahead[int(np.argmin(left))]
+    return None
+
+
+def _likeliest(nominal: Rig, e: Explanation, ahead: Ahead, name: str) -> Fit | None:
+    """A family's likeliest form by itself, on means of samples."""
+    problem = uncertain(nominal, e.segment.anew(run=run_of(ahead[0], e.segment.entry)), ahead[0])
+    forms = [c for c in candidates_for(problem.segment, nominal) if c.effect == name]
+    return likeliest_on_all(problem, problem.nominal(), forms)
+
+
+def _left(e: Explanation, fit: Fit, ahead: Ahead) -> list[float]:
+    """The mean squares that a fit for the first of the sessions ``ahead`` leaves, made anew for each."""
+    fits = (fit if logs is ahead[0] else begun_as(e, fit, logs) for logs in ahead)
+    return [float(np.mean(of.weighed**2)) for of in fits]
