@@ -36,7 +36,7 @@ from focgen.diagnosis.hypotheses.initial import (
     rested_long,
 )
 from focgen.diagnosis.hypotheses.input_covariance import input_covariance
-from focgen.diagnosis.hypotheses.slow import families_in, suits_what_is_slow
+from focgen.diagnosis.hypotheses.roughly import alone, families_in, leaves_less_beside, suits_what_is_slow
 from focgen.diagnosis.model import Diagnosis
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.decimate import decimated
@@ -59,7 +59,6 @@ from focgen.rig.plausibility import doubts
 from focgen.rig.recalled import all_ahead
 from focgen.rig.replay import after_session, experiments, with_known
 from focgen.rig.rig import Rig
-from focgen.rig.session import run_of
 
 _RIVALS = 3  # of what was found that may tell how the logs begin
 _CARRIED = 2  # times that findings are made anew with what they left in later experiments
@@ -181,16 +180,6 @@ def _slow(
     return explanations, session
 
 
-def _leaves_less(
-    nominal: Rig, e: Explanation, logs: Sequence[Experiment], tried: Sequence[Sequence[str]]
-) -> bool:
-    """Whether any of these sets of families, and no others, leaves far less than what was found, where the
-    experiments begin as in ``logs``."""
-    segment = e.segment.anew(run=run_of(logs, e.segment.entry))
-    left = (explain(nominal, segment, logs, NUMBERS.nats, names).square for names in tried)
-    return any(square < NUMBERS.unlikely * e.square for square in left)
-
-
 def _told_by_another(
     search: _Search, explanations: tuple[Explanation, ...], session: tuple[Experiment, ...]
 ) -> tuple[tuple[Explanation, ...], tuple[Experiment, ...]]:
@@ -224,8 +213,8 @@ def _others(nominal: Rig, e: Explanation, session: Sequence[Experiment]) -> Iter
     yield from list(known.values())[1:]
     if e.predictability.share > NUMBERS.left:
         others = sorted((name for name in e.errors if name not in known), key=lambda name: e.errors[name])
-        for name in others[:_RIVALS]:
-            yield explain(nominal, e.segment, session, NUMBERS.nats, [name]).best
+        fits = (alone(nominal, e.segment, session, name) for name in others[:_RIVALS])
+        yield from (fit for fit in fits if fit is not None)
 
 
 def _told_by(
@@ -266,11 +255,8 @@ def _remembers(search: _Search, e: Explanation, lasting: Sequence[Experiment]) -
     wanders = any(candidate.form.wanders for candidate in e.best.problem.candidates)
     if search.only is not None or not (wanders or e.predictability.share > NUMBERS.left):
         return False
-    found, others = e.best.problem.families, families_in(e, lambda f: f.remembers)
-    beside = dict.fromkeys(
-        tuple(sorted({*found, name})) for name in others
-    )  # one that was found adds nothing
-    return _leaves_less(search.nominal, e, lasting, list(beside))
+    others = families_in(e, lambda f: f.remembers)
+    return any(leaves_less_beside(search.nominal, e, lasting, name) for name in others)
 
 
 def _carried_on(

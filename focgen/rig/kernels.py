@@ -188,17 +188,19 @@ def power_creep(x: Array, rest: Bytes, h: float, tau: float, scale: float, power
 
 def rational(x: Array, rest: Bytes, b: Array, a: Array) -> Array:
     """A discrete filter with numerator ``b`` and denominator ``a`` (a[0] = 1), of any length."""
-    order, tables, scratch = _padded((b, a), _REGISTERS)
-    return _call("focgen_filter", x, rest, order, *_doubles(*tables, scratch))
+    order, pointers = _padded((b, a), _REGISTERS)
+    return _call("focgen_filter", x, rest, order, *pointers)
 
 
-def _padded(sides: Sequence[Array], least: int = 1) -> tuple[int, Sequence[Array], Array]:
-    """The order of a discrete filter, its ``sides`` of one length, ``least`` or more, and room as long."""
+def _padded(sides: Sequence[Array], least: int = 1) -> tuple[int, list[Any]]:
+    """The order of a discrete filter, and pointers to its ``sides`` of one length, ``least`` or more, and to
+    room as long; the first keeps what all of them point to."""
     order = max(*map(len, sides), least) - 1
-    scratch, *tables = np.zeros((len(sides) + 1, order + 1))
-    for table, values in zip(tables, sides):
-        table[: len(values)] = values
-    return order, tables, scratch
+    table = np.zeros((len(sides) + 1, order + 1))
+    for row, values in zip(table, sides):
+        row[: len(values)] = values
+    (first,) = _doubles(table)
+    return order, [first, *(first + k * (order + 1) for k in range(1, len(table)))]
 
 
 def plant(
@@ -248,9 +250,8 @@ def bent_modes(
 
 def bent_rational(x: Array, rest: Bytes, b: Array, c: Array, a: Array, spring: Sequence[float]) -> Array:
     """As :func:`rational`, with ``c`` the numerator for what ``spring`` (10,) takes from the input."""
-    order, tables, scratch = _padded((b, c, a))
-    pointers = _doubles(*tables, np.array(spring, float), scratch)
-    return _call("focgen_bent_filter", x, rest, order, *pointers)
+    order, (*tables, room) = _padded((b, c, a))
+    return _call("focgen_bent_filter", x, rest, order, *tables, *_doubles(np.array(spring, float)), room)
 
 
 Slowness = tuple[int, Sequence[float], Array]
@@ -281,9 +282,9 @@ def _row_with(name: str, x: Array, rest: Bytes, row: tuple[Any, ...], law: tuple
 def _filter_with(name: str, x: Array, rest: Bytes, sides: tuple[Array, ...], law: tuple[Any, ...]) -> Array:
     """The same over a discrete filter."""
     by, numbers, course = law
-    order, tables, scratch = _padded(sides)
-    *pointers, own, each, room = _doubles(*tables, np.array(numbers, float), course, scratch)
-    return _call(name, x, rest, order, *pointers, by, own, each, room)
+    order, (*tables, room) = _padded(sides)
+    own, each = _doubles(np.array(numbers, float), course)
+    return _call(name, x, rest, order, *tables, by, own, each, room)
 
 
 def levered_modes(
@@ -297,9 +298,8 @@ def levered_modes(
 
 def levered_rational(x: Array, rest: Bytes, b: Array, a: Array, lever: Sequence[float]) -> Array:
     """As :func:`rational`, with the input as strong as ``lever`` (3,) says."""
-    order, tables, scratch = _padded((b, a))
-    pointers = _doubles(*tables, np.array(lever, float), scratch)
-    return _call("focgen_levered_filter", x, rest, order, *pointers)
+    order, (*tables, room) = _padded((b, a))
+    return _call("focgen_levered_filter", x, rest, order, *tables, *_doubles(np.array(lever, float)), room)
 
 
 Wear = tuple[int, Sequence[float], Array]

@@ -14,6 +14,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -128,14 +129,15 @@ def about_as_long(duration: float) -> float:
 
 
 def settled(made: Array, x: Array, rest: Bytes, missing: float) -> Array:
-    """The response (n,) with what modes too slow to move, of gain ``missing``, keep of an input held for ever
-    before an experiment."""
+    """The response (n,), just made, with what modes too slow to move, of gain ``missing``, keep of an input
+    held for ever before an experiment."""
     if not missing or rest.max() != kernels.BALANCED:
         return made
-    firsts = np.flatnonzero(rest)
-    kept = missing * x[firsts] * (rest[firsts] == kernels.BALANCED)
-    found: Array = made + np.repeat(kept, np.diff([*firsts, len(x)]))
-    return found
+    firsts = np.flatnonzero(rest).tolist()
+    for a, b in pairwise([*firsts, len(x)]):
+        if rest[a] == kernels.BALANCED:
+            made[a:b] += missing * x[a]
+    return made
 
 
 def between(x: Array, rest: Bytes, h: float, modes: Modes, share: float) -> Array:

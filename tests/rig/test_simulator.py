@@ -139,6 +139,15 @@ def test_play_against_a_loop_in_python():
     np.testing.assert_array_equal(kernels.play(x, rest(500), 0.7), expected)
 
 
+def test_a_spline_is_what_scipy_makes_of_it_and_level_beyond():
+    knots, sizes = np.linspace(0.0, 1.0, 6), np.random.default_rng(4).normal(size=6)
+    of = CubicSpline(knots, sizes, bc_type="natural")
+    x = np.r_[knots, np.linspace(-0.1, 1.0, 400), np.nextafter(1.0, [0.0, 2.0])]
+    assert np.allclose(kernels.spline(x, of.c), of(x), rtol=0.0, atol=1e-13)
+    beyond = kernels.spline(np.array([1.3, np.inf, np.nan]), of.c)
+    assert np.allclose(beyond[:2], sizes[-1]) and np.isnan(beyond[2])
+
+
 def test_bouc_wen_loop_does_not_vanish_with_frequency():
     areas = []
     for n in (400, 4000):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -274,8 +274,21 @@ class Problem:
         with np.errstate(over="ignore", invalid="ignore"):
             made = chain.run(x, segment.stages[0], segment.stages[-1], self._begun(stood), segment.between)
         made = self._read(made if segment.readings is None else made[segment.readings], *gauges)
-        made = made + segment.loose @ begun if len(begun) and begun.any() else made
-        return made + self._uneven(zeros) if len(zeros) and zeros.any() else made
+        made = made + self._kept("loose", begun, segment.loose.__matmul__, probe) if begun.any() else made
+        return made + self._kept("zeros", zeros, self._uneven, probe) if zeros.any() else made
+
+    def _kept(
+        self, what: str, numbers: np.ndarray, of: Callable[[np.ndarray], np.ndarray], probe: bool
+    ) -> np.ndarray:
+        """What these ``numbers`` make, as it was where they are as lately: most others move without them."""
+        kept: tuple[bytes, np.ndarray] = self.memory.get(what, (b"", numbers))
+        key, (old, made) = numbers.tobytes(), kept
+        if old == key:
+            return made
+        new = of(numbers)
+        if not probe:
+            self.memory[what] = key, new
+        return new
 
     def _parted(self, nuisances: np.ndarray) -> tuple[np.ndarray, ...]:
         """The nuisances behind the alignment: of gauges, of the input's ways, of begins, of zeros, and of

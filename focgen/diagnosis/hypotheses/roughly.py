@@ -1,5 +1,7 @@
-"""What is slow, from log to log: a creep, or a reading that relaxes, that the earlier logs left in the later
-ones. Where every log is taken to begin at rest it is lost to a drift."""
+"""Whether a family leaves far less than what was found, where the logs begin in another way: one that is slow
+with all earlier logs ahead, or one that stays where the log before left it. Where every log is taken to begin
+at rest, these are lost to a drift. A search in earnest takes seconds, so each is fitted on means first.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +14,13 @@ from focgen.diagnosis.hypotheses.explain import Explanation, begun_as, candidate
 from focgen.diagnosis.hypotheses.nuisances import uncertain
 from focgen.diagnosis.hypotheses.search import likeliest_on_all
 from focgen.diagnosis.numbers import NUMBERS
+from focgen.diagnosis.problem.segments import Segment
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import Effect, library
 from focgen.rig.rig import Rig
 from focgen.rig.session import run_of
+
+_NEAR = 1.1  # times what is asked: with so much left on means, a search may leave less
 
 Ahead = Sequence[tuple[Experiment, ...]]
 """A session with all earlier logs ahead of every log, by one pause between them or another."""
@@ -34,10 +39,10 @@ def suits_what_is_slow(nominal: Rig, e: Explanation, ahead: Ahead) -> tuple[Expe
     for name in families_in(e, lambda f: f.slow):
         if e.best.problem.families == (name,):  # what it left in later logs is asked of what was found
             continue
-        roughly = _likeliest(nominal, e, ahead, name)
+        segment = e.segment.anew(run=run_of(ahead[0], e.segment.entry))
+        roughly = alone(nominal, segment, ahead[0], name)
         if roughly is None or min(_left(e, roughly, ahead)) > e.square / NUMBERS.unlikely:
             continue
-        segment = e.segment.anew(run=run_of(ahead[0], e.segment.entry))
         found = explain(nominal, segment, ahead[0], NUMBERS.nats, [name])
         left = _left(found, found.best, ahead)
         if min(left) < least:
@@ -45,11 +50,25 @@ def suits_what_is_slow(nominal: Rig, e: Explanation, ahead: Ahead) -> tuple[Expe
     return None
 
 
-def _likeliest(nominal: Rig, e: Explanation, ahead: Ahead, name: str) -> Fit | None:
-    """A family's likeliest form by itself, on means of samples."""
-    problem = uncertain(nominal, e.segment.anew(run=run_of(ahead[0], e.segment.entry)), ahead[0])
+def alone(nominal: Rig, segment: Segment, logs: Sequence[Experiment], name: str) -> Fit | None:
+    """A family's likeliest form by itself, on means of samples; None where it has none here."""
+    problem = uncertain(nominal, segment, logs)
     forms = [c for c in candidates_for(problem.segment, nominal) if c.effect == name]
     return likeliest_on_all(problem, problem.nominal(), forms)
+
+
+def leaves_less_beside(nominal: Rig, e: Explanation, logs: Sequence[Experiment], name: str) -> bool:
+    """Whether what was found and the family ``name`` beside it, and no others, leave far less than what was
+    found, where the experiments begin as in ``logs``."""
+    segment, asked = e.segment.anew(run=run_of(logs, e.segment.entry)), NUMBERS.unlikely * e.square
+    roughly = begun_as(e, e.best, logs)
+    if name not in roughly.problem.families:
+        forms = roughly.problem.untried([c for c in candidates_for(segment, nominal) if c.effect == name])
+        roughly = likeliest_on_all(roughly.problem, roughly.vector, forms) or roughly
+    if np.mean(roughly.weighed**2) > _NEAR * asked:
+        return False
+    families = sorted({*e.best.problem.families, name})
+    return explain(nominal, segment, logs, NUMBERS.nats, families).square < asked
 
 
 def _left(e: Explanation, fit: Fit, ahead: Ahead) -> list[float]:
