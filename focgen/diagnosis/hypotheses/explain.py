@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, partial
 
 import numpy as np
 
@@ -48,8 +49,8 @@ class Explanation:
     """A segment explained. ``nominal``: its nominal parameters refitted; ``best``: with the effects. Each has
     a ``predictability`` of its residual from the inputs. ``errors``: by family, the root-mean-square
     residual with that effect alone, as a share of the refitted nominal's; ``converter``: the coarse one;
-    ``whole``: what this is the part of that is not in question, or no effect at all; ``others``: two effects
-    each that may be there instead of the one found.
+    ``whole``: what this is the part of that is not in question, or no effect at all; ``pairs``: makes the
+    ``others``, once, which takes as long as the rest: of most explanations nobody asks for them.
     """
 
     segment: Segment
@@ -63,7 +64,12 @@ class Explanation:
     errors: dict[str, float]
     converter: Converter | None = None
     whole: Explanation | None = None
-    others: tuple[TwoOthers, ...] = ()
+    pairs: Callable[[], tuple[TwoOthers, ...]] = tuple
+
+    @property
+    def others(self) -> tuple[TwoOthers, ...]:
+        """Two effects each that may be there instead of the one found."""
+        return self.pairs()
 
     @property
     def strained(self) -> bool:
@@ -229,7 +235,7 @@ def _explained(
     rankings = _or_two(rankings, candidates, asked)
     known = [f for r in rankings for f in (r.base, *r.best.values())]
     best, weighing = _sifted(rankings[-1], asked, known)
-    others = () if granted else two_others(best, rankings[0], candidates, weighing, asked)
+    pairs = partial(two_others, best, rankings[0], candidates, weighing, asked)
     nominal = fit(problem, rankings[0].base.vector[: len(given)], weighing)
     errors = rankings[0].errors
     if remembers(best) and not asked.granted and (seen := unleft(best)) is not None:
@@ -255,7 +261,7 @@ def _explained(
         predictability(segment, nominal.weighed, response),
         errors,
         converter,
-        others=others,
+        pairs=tuple if granted else cache(pairs),
     )
     return _off_by_itself(made, examined.off)
 

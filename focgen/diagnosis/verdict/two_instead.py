@@ -29,7 +29,8 @@ class Two(Instead):
 def two_instead(e: Explanation) -> Two | None:
     """What two effects may be there instead of the only one found; None where that explains its segment, or
     a rival has taken its place."""
-    if not e.others or [c.rivals[0].effect for c in e.causes] != [e.others[0].instead]:
+    found = [c.rivals[0].effect for c in e.causes]
+    if len(found) != 1 or not e.others or found != [e.others[0].instead]:
         return None
     odds = float(np.logaddexp.reduce([p.odds for p in e.others]))
     return Two(frozenset({e.others[0].instead}), odds, e.others)
