@@ -155,6 +155,44 @@ def test_what_a_pump_has_put_in_is_lost_for_good(lost, act, stood):
     assert not fits_in(lost.form, "regulator", replace(pump, regulator=SENSOR))
 
 
+def moved_in_small_steps(flow, stood, asked, rate, gap):
+    """The same of a pump that moves ``rate`` of what it is ``asked``, through a ``gap`` of its spindle."""
+    volume, nut, found = 0.0, 0.0, [stood]
+    for q, then in pairwise(flow):
+        for j in range(200):
+            volume += rate(0.95 * asked(q + (then - q) * (j + 0.5) / 200)) * H / 200
+            nut = float(np.clip(nut, volume - gap, volume + gap))
+        found.append(stood + nut)
+    return np.array(found)
+
+
+MOST, PACE = 0.6 * np.max(np.abs(FLOW)), 0.5 * np.max(np.abs(FLOW))
+
+
+@pytest.mark.parametrize("stood", [0.0, 3.0])
+@pytest.mark.parametrize(
+    "less, asked, rate, gap",
+    [
+        (("flow_limit", "driven", MOST), lambda q: np.clip(q, -MOST, MOST), float, 0.0),
+        (("flow_limit", "spent", PACE), float, lambda v: np.clip(v, -PACE, PACE), 0.0),
+        (("valve_asymmetry", "back", 0.9), float, lambda v: v * (0.9 if v < 0.0 else 1.0), 0.0),
+        (("valve_stiction", "lost_motion", 0.4), float, float, 0.4),
+    ],
+    ids=["driver", "speed", "way", "spindle"],
+)
+def test_what_a_pump_does_not_move_is_not_made_up_for(less, asked, rate, gap, stood):
+    """Red when a pump that was too slow, or whose spindle turned free, comes to its place later."""
+    pump = replace(RIGS["whole"], regulator=TransferFunction([(0.95, 0.0)], [(1.0, 1.0)]))
+    effect, run = placed(*less), Run.of([len(FLOW)], [0.0], H, stands=[stood])
+    made = Chain(pump, (effect,)).run(np.asarray(FLOW, float), "regulator", "regulator", run)
+    whole = Chain(pump).run(np.asarray(FLOW, float), "regulator", "regulator", run)
+    expected = moved_in_small_steps(FLOW, stood, asked, rate, gap)
+    # a line from sample to sample that passes a limit is cut off at its end, not where it passes
+    assert np.max(np.abs(made - expected)) < 0.06 < 0.2 * np.max(np.abs(whole - expected))
+    assert fits_in(effect.form, "regulator", pump)
+    assert not fits_in(effect.form, "regulator", replace(pump, regulator=SENSOR))
+
+
 def test_a_volume_is_told_through_a_curve():
     """Red when what a pump held is told as if the actuator did not bend what it makes of it."""
     rig, curve = RIGS["whole"], placed("gain_nonlinearity", "force_factor", 0.5, 0.0, 12.0, stage="actuator")

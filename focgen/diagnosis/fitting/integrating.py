@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -65,9 +66,18 @@ def _independent(left: np.ndarray) -> float:
 
 def settled(of: Fit) -> Fit:
     """A fit with the vector that brings a rig that integrates closest to its output; others as they are."""
+    return fit(of.problem, _to_the_path(of).vector, WHITE, 0) if of.problem.segment.pace else of
+
+
+def as_it_shows(of: Fit) -> Fit:
+    """A fit by which it is seen what the rig does: to its whole path where a pump makes that, which adds up
+    without further errors; others as they are."""
+    pumped = of.problem.segment.pace and of.problem.nominals.rig.integrator == "regulator"
+    return _to_the_path(of) if pumped else of
+
+
+@lru_cache(maxsize=8)
+def _to_the_path(of: Fit) -> Fit:
     problem = of.problem
-    if not problem.segment.pace:
-        return of
     plain: Problem = replace(problem, segment=replace(problem.segment, pace=0.0), memory={})
-    found = fit(plain, of.vector, WHITE, _ROUNDS)
-    return fit(problem, found.vector, WHITE, 0)
+    return fit(plain, of.vector, WHITE, _ROUNDS)

@@ -2,11 +2,14 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from focgen.arrays import Array
 from focgen.rig import kernels
 from focgen.rig.dynamics import Dynamics, Flow, Throat
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 from focgen.rig.effects._lags import PACE, RATE, THROAT
+from focgen.rig.effects._pumps import given
 
 
 def _hard(x: Array, values: Values, run: Run) -> Array:
@@ -26,6 +29,20 @@ def _throats(x: Dynamics, values: Values, run: None) -> Dynamics:
     return replace(x, throat=Throat(scale, scale, pace))
 
 
+def _spent(x: Array, values: Values, run: Run) -> Array:
+    """What a pump is told beyond its rate never comes."""
+    most = values[0] * run.h
+    return given(x, run, lambda steps: np.clip(steps, -most, most))
+
+
+def _driven(x: Array, values: Values, run: Run) -> Array:
+    return np.clip(x, -values[0], values[0])
+
+
+_DRIVEN = Parameter("most", level=1, lower=0.1, upper=1.3, starts=(0.95, 0.75, 0.5), zero=1.3)
+# of all that is there in a response: no pump fills its bladder so quickly
+_PUMPED = replace(RATE, starts=(0.5, 0.25, 0.12, 0.06, 0.03))
+
 EFFECT = Effect(
     name="flow_limit",
     stage="regulator",
@@ -38,6 +55,9 @@ EFFECT = Effect(
         # what flows into the chamber itself
         Form("choked", "chamber", (RATE,), _own),
         Form("throats", "chamber", (PACE, THROAT), _throats),
+        # what a pump or a motor does not move in time is not made up for later: its driver ends, or its speed
+        Form("driven", "command", (_DRIVEN,), _driven, adds_up=True),
+        Form("spent", "supply", (_PUMPED,), _spent, adds_up=True),
         Form(
             "saturating",
             "supply",

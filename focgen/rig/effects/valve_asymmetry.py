@@ -2,11 +2,14 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from focgen.arrays import Array
 from focgen.rig import kernels
 from focgen.rig.dynamics import Dynamics, Flow, Throat
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 from focgen.rig.effects._lags import PACE, RATE, THROAT, rising, two_paced
+from focgen.rig.effects._pumps import given
 
 _SPEED = Parameter("venting_speed", lower=0.05, upper=20.0, starts=(0.7, 2.0), zero=1.0, log=True)
 
@@ -43,6 +46,11 @@ def _vent(x: Dynamics, values: Values, run: None) -> Dynamics:
     return replace(x, flow=Flow(fill=x.flow.fill, vent=values[0]))
 
 
+def _back(x: Array, values: Values, run: Run) -> Array:
+    """A pump that moves another share of what it is told on the way back."""
+    return given(x, run, lambda steps: np.where(steps < 0.0, values[0] * steps, steps))
+
+
 EFFECT = Effect(
     name="valve_asymmetry",
     stage="regulator",
@@ -60,6 +68,7 @@ EFFECT = Effect(
         # one of its ways is too narrow
         Form("choked_supply", "chamber", (RATE,), _fill),
         Form("choked_exhaust", "chamber", (RATE,), _vent),
+        Form("back", "supply", (replace(_SPEED, starts=(0.95, 1.05)),), _back, adds_up=True),
         Form("two_lags", "supply", (_time("fill", 0.02, 0.02), _time("vent", 0.2, 1.0)), _lags),
         Form(
             "orifice",

@@ -1,7 +1,10 @@
 """A valve that does nothing until a change of the command has crossed a band."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import product
+
+import numpy as np
 
 from focgen.arrays import Array
 from focgen.rig import kernels
@@ -27,6 +30,16 @@ def _play(x: Array, values: Values, run: Run) -> Array:
     return kernels.play(x, run.rest, values[0])
 
 
+def _lost_motion(x: Array, values: Values, run: Run) -> Array:
+    """A pump's piston, whose spindle lies in its gap as the log before left it."""
+    made, free = np.empty(len(x)), 0.0
+    for a, b in run.spans:
+        spindle = x[a:b] - x[a] - free
+        piston = kernels.play(spindle, run.rest[a:b], values[0])
+        made[a:b], free = x[a] + piston, piston[-1] - spindle[-1]
+    return made
+
+
 def _stick(x: Array, values: Values, run: Run) -> Array:
     return kernels.stick(x, run.rest, values[0], 0.0)
 
@@ -42,6 +55,7 @@ def _slips(x: Array, values: Values, run: Run) -> Array:
 
 
 _BAND = Parameter("band", level=1, lower=0.0, upper=0.5, starts=_BANDS, zero=0.0)
+_LOST = replace(_BAND, starts=(0.003, 0.02, 0.1))
 
 EFFECT = Effect(
     name="valve_stiction",
@@ -53,6 +67,8 @@ EFFECT = Effect(
     remembers=True,
     forms=[
         Form("play", "command", (_BAND,), _play),
+        # a pump's spindle or gear lies behind what it adds up
+        Form("lost_motion", "supply", (_LOST,), _lost_motion, adds_up=True),
         Form("stick", "command", (_BAND,), _stick, jumps=True),
         # after a slip it follows until the command turns round, or is held anew at once
         Form("stick_slip", "command", _parameters(_BANDS, _LEFTS), _slip, jumps=True),

@@ -1,0 +1,55 @@
+"""A pump that does not move what it is told: a driver that ends, a spindle with lost motion, a way that gives
+less.
+
+Red when what it did not move is thought to come later: the limit is then a bent gain, and the spindle a lag.
+"""
+
+import numpy as np
+import pytest
+
+from focgen.diagnosis.diagnose import diagnose
+from focgen.logs.experiment import Experiment
+from tests.diagnosis.test_held import GAIN, LAG, NOISE, PARTS, RIG, H
+
+
+def session(seed, most=np.inf, back=1.0, gap=0.0):
+    """Two logs of strokes of all sizes, made in steps, of a pump that is driven no faster than ``most``,
+    gives ``back`` of what it is told on the way back, and has a ``gap`` to each side in its spindle."""
+    rng, piston, volume, angle, found = np.random.default_rng(seed), 0.0, 0.0, 0.0, []
+    for log in range(2):
+        level = np.r_[0.0, np.cumsum(rng.uniform(1.0, 6.0, 12) * np.tile([1.0, -1.0], 6))]
+        flow = np.concatenate([[0.0] * 20, *(np.r_[np.full(20, v), np.zeros(60)] for v in np.diff(level))])
+        made = []
+        for q in flow:
+            made.append((volume, angle))
+            for _ in range(PARTS):
+                driven = GAIN * float(np.clip(q, -most, most))
+                piston += H / PARTS * driven * (back if driven < 0.0 else 1.0)
+                volume = float(np.clip(volume, piston - gap, piston + gap))
+                angle += H / PARTS * (volume - angle) / LAG
+        read = np.array(made) + NOISE * 6.0 * rng.standard_normal((len(flow), 2))
+        signals = {"command": flow, "pressure": read[:, 0], "output": read[:, 1]}
+        found.append(Experiment(f"run {log}", H, signals, start=log * H * len(flow)))
+    return found
+
+
+@pytest.mark.parametrize(
+    "fault, effect, size",
+    [
+        ({"most": 5.0}, "flow_limit", 5.0),
+        ({"back": 0.9}, "valve_asymmetry", 0.9),
+        ({"gap": 0.4}, "valve_stiction", 0.4),
+    ],
+)
+def test_what_a_pump_does_not_move_is_named(fault, effect, size):
+    found = diagnose(RIG, session(1, **fault), pictures=False)
+    (cause,) = found.causes
+    first = cause.candidates[0]
+    assert first.effect == effect
+    assert first.confidence > 0.9
+    assert next(iter(first.parameters.values())).value == pytest.approx(size, rel=0.1)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_pump_that_moves_all_of_it_is_healthy(seed):
+    assert diagnose(RIG, session(seed), pictures=False).verdict in ("none", "parameters")
