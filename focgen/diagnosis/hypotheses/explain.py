@@ -82,11 +82,6 @@ class Explanation:
         return float(np.mean(self.best.weighed**2))
 
     @property
-    def freed(self) -> bool:
-        """Whether it had to be let go further than that."""
-        return self.best.problem.nominals.far and self.strained
-
-    @property
     def stage(self) -> str | None:
         """The one stage this segment is, None where stages are merged."""
         return self.segment.stages[0] if len(self.segment.stages) == 1 else None

@@ -30,7 +30,7 @@ from focgen.diagnosis.verdict.confidence import tied
 from focgen.diagnosis.verdict.evidence import Evidence
 from focgen.diagnosis.verdict.improvement import Improvement
 from focgen.diagnosis.verdict.moments import another
-from focgen.diagnosis.verdict.moves import far_moves
+from focgen.diagnosis.verdict.moves import at_the_end, far_moves
 from focgen.diagnosis.verdict.nominal import likelier_nominal, nominal_alone, unnamed
 from focgen.diagnosis.verdict.sizes import at_their_ends, estimates
 from focgen.diagnosis.verdict.summary import Summary, doubts, sorted_out, sound_parts
@@ -86,6 +86,7 @@ def conclude(
             *of_file(rig),
             *notes_of(logs),
             *far,
+            *(at_the_end(rig, summary.rigs.fitted) if summary.causes else ()),
             *cautions(summary.causes, unknown, list(doubted), [*off, *nominal_alone(explanations, off)]),
             *lesser(stands.beside),
             *the_rest(summary),
@@ -164,7 +165,7 @@ def _found(
     trusted."""
     rigs = summary.rigs
     kept, sure = tied(cause.rivals)
-    sure = sure * NUMBERS.unlikely if e.freed else sure  # numbers far off explain the same
+    sure = sure * NUMBERS.unlikely if e.strained else sure  # numbers far off explain the same
     sure = sure * NUMBERS.unlikely if summary.stands_for_more or something_unknown_acts(e) else sure
     trust = min(trust, NUMBERS.smaller) if at_their_ends(cause.rivals[0]) else trust
     sure = sure * _lasting(e, cause) * min(_beside(e, cause), trust)

@@ -24,6 +24,16 @@ def far_moves(given: Rig, refitted: Rig) -> tuple[str, ...]:
     )
 
 
+def at_the_end(given: Rig, refitted: Rig) -> tuple[str, ...]:
+    """A line for each number of the actuator that the refit moved as far as it lets one go."""
+    return tuple(
+        f"the refit moves the {stage}'s {what} by {100 * moved:+.3g} %, which is as far as it lets a number "
+        f"go whose uncertainty is {100 * known:.3g} %: it may be that, or something else, that is wrong"
+        for stage, what, moved, known in _moves(given, refitted)
+        if stage == "actuator" and known and abs(abs(moved) - WITHIN * known) <= _SLACK
+    )
+
+
 def _moves(given: Rig, refitted: Rig) -> Iterator[tuple[str, str, float, float]]:
     """Stage, what of it, by which part of itself it moved, and to which part it was known."""
     for stage in ("regulator", "sensor"):
