@@ -13,6 +13,7 @@ offset holds a rig off as a past does, but no larger one than what is left for g
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -30,7 +31,7 @@ from focgen.rig.placed import Placed
 from focgen.rig.rig import UNITY, LinearActuator, Rig
 from focgen.rig.stages import ENTERS, STAGES
 from focgen.rig.stood import standing
-from focgen.rig.tried import Try, likeliest, nearest
+from focgen.rig.tried import Try, damped_step, likeliest, nearest
 
 NOTE = "begins away from rest: the state that it starts from is estimated"
 _SEEN = 40.0  # response times from the beginning that are looked at,
@@ -175,11 +176,11 @@ class _Setting:
         self, rig: Rig, log: Experiment, entry: str, placed: Sequence[Placed], scales: Magnitudes
     ) -> None:
         self.chain, self.entry, self.h = Chain(rig, tuple(placed)), entry, log.sample_time
-        pace, self.reach = scales.pace, scales.sizes[entry]
-        self.pace = pace
+        self.anywhere = False  # a stage that adds up may have stood anywhere, with what moves it on top
+        self.pace, self.reach = scales.pace, scales.sizes[entry]
         self.range = [end / self.reach for end in scales.ranges[entry]]
-        self.n = n = min(len(log), max(int(_SEEN * pace / self.h), _LEAST))
-        self.longest = max(_LONGEST * pace, 20.0 * self.h)
+        self.n = n = min(len(log), max(int(_SEEN * self.pace / self.h), _LEAST))
+        self.longest = max(_LONGEST * self.pace, 20.0 * self.h)
         self.roles = scales.behind(entry)
         self.stages = ENTERS[entry], list(self.roles)[-1]
         self.log = log
@@ -188,10 +189,10 @@ class _Setting:
         measured = (np.asarray(log[role], float)[:n] for role in self.roles.values())
         self.y = np.stack([y / unit for y, unit in zip(measured, self.units)], axis=1)
         self.level = float(self.x[0] if entry == "command" else np.mean(self.x[:FIRST]))
-        self.counts = (pace / (pace + np.arange(n) * self.h))[:, None]
+        self.counts = (self.pace / (self.pace + np.arange(n) * self.h))[:, None]
         self.asked = _DRIVEN
         if abs(self.level) < _NOTHING * self.reach:
-            self._near_nothing(max(_SHOWN * pace / self.h, 2 * FIRST))
+            self._near_nothing(max(_SHOWN * self.pace / self.h, 2 * FIRST))
 
     def _near_nothing(self, least: float) -> None:
         """What counts where the input is 0 at first: its rest there, where that is as long as ``least``."""
@@ -208,6 +209,8 @@ class _Setting:
     def at(self, begin: Begin, free: int) -> Try:
         """What a begin leaves, ``free`` numbers of which are fitted."""
         raw = self._missed(begin)
+        if self.anywhere:
+            return Try(begin, free + 1, raw - self._mean(raw), self._counted(raw, np.inf))
         return Try(begin, free, raw, self._counted(raw, np.minimum(self.asked.offset, self.borne)))
 
     def _missed(self, begin: Begin) -> Array:
@@ -228,9 +231,11 @@ class _Setting:
 
     def _counted(self, raw: Array, offset: float | Array) -> Array:
         """What is left (n, signals) less an offset of so much at most, the later the less it counts."""
-        mean = (raw * self.counts**2).sum(axis=0) / (self.counts**2).sum()
-        made: Array = (raw - np.clip(mean, -offset, offset)) * self.counts
+        made: Array = (raw - np.clip(self._mean(raw), -offset, offset)) * self.counts
         return made
+
+    def _mean(self, raw: Array) -> Array:
+        return np.average(raw, axis=0, weights=np.broadcast_to(self.counts**2, raw.shape))
 
     def in_windows(self, begin: Begin) -> Begin:
         """The begin with what the input was before in windows, the longer the longer they are ago, each as
@@ -266,7 +271,7 @@ class _Setting:
     def chosen(self, further: Sequence[Try] = ()) -> Begin:
         """The begin that the data ask for, of all kinds and the ``further`` ones."""
         rest, asked = self.at(REST, 0), self.asked
-        noise = np.array([_white(y) for y in self.y.T])
+        noise = np.array([white_level(y) for y in self.y.T])
         moved = rest.first > np.maximum(_APART * noise / np.sqrt(FIRST), asked.off)
         if not moved.any():
             return self._kept(rest)
@@ -276,20 +281,27 @@ class _Setting:
 
         most = asked.cost * rest.cost
         tries = [t for t in (*further, *self.tries()) if off(t) < asked.mended and t.cost < most]
+        if tries and ENTERS[self.entry] == self.chain.rig.integrator:
+            return likeliest([*tries, *self._from_anywhere()], _IDLE.nats).begin  # nothing asks for a stroke
         if not tries:
             return REST
-        if ENTERS[self.entry] == self.chain.rig.integrator:  # which may have stood anywhere
-            stood = Try(REST, 1, rest.raw, self._counted(rest.raw, np.inf))
-            return likeliest([stood, *tries], asked.nats).begin
         sure = np.max(rest.first) > asked.far and min(map(off, tries)) < asked.surely
         if sure and self._offset_explains(rest, tries):
             return REST
         return likeliest(tries if sure else [rest, *tries], asked.nats).begin
 
+    def _from_anywhere(self) -> list[Try]:
+        """The same of a stage that adds up, which may have stood anywhere before."""
+        of = copy(self)
+        of.anywhere = True
+        rest = of.at(REST, 0)
+        least = self.asked.mended * np.linalg.norm(rest.first)
+        return [rest, *(t for t in of.tries() if np.linalg.norm(t.first) < least)]
+
     def _kept(self, rest: Try) -> Begin:
         """The first level held for ever where a log begins near rest: a valve that sticks keeps a little in
         the rig. The rig has to be found where that level holds it: what is off otherwise stays so."""
-        least = _APART * _white(self.x) / np.sqrt(FIRST)
+        least = _APART * white_level(self.x) / np.sqrt(FIRST)
         if self.asked is not _IDLE or abs(self.level) <= max(least, _LITTLE * self.reach):
             return REST
         held = self.at(Begin((self.level,)), 0)
@@ -368,7 +380,7 @@ class _Setting:
         for _ in range(_ROUNDS):
             moved = [self.at(begin(x + _STEP * e), 0).left - now.left for e in np.eye(len(x))]
             slope = np.stack([m.ravel() for m in moved], axis=1) / _STEP
-            trial_x = np.clip(x - _step(slope, now.left.ravel(), damping), low, high)
+            trial_x = np.clip(x - damped_step(slope, now.left.ravel(), damping), low, high)
             trial = self.at(begin(trial_x), len(x))
             if trial.cost >= now.cost:
                 damping *= 30.0
@@ -385,15 +397,3 @@ class _Setting:
         rows = [(first, last), (self.range[0] - _BEYOND, self.range[1] + _BEYOND), (first, last)]
         low, high = np.array(rows[:count]).T
         return low, high
-
-
-def _step(slope: Array, left: Array, damping: float) -> Array:
-    normal = slope.T @ slope
-    weight = damping * np.diag(normal) + 1e-9 * np.trace(normal) + 1e-300
-    made: Array = np.clip(np.linalg.solve(normal + np.diag(weight), slope.T @ left), -1.0, 1.0)
-    return made
-
-
-def _white(y: Array) -> float:
-    """The standard deviation of what is white of a signal (n,), 0 where it is too short to tell."""
-    return white_level(y) if len(y) > 4 else 0.0

@@ -60,6 +60,14 @@ def nearest(rows: Array, left: Array) -> tuple[Array, int]:
     return made, round(float(np.sum(kept)))
 
 
+def damped_step(slope: Array, left: Array, damping: float) -> Array:
+    """Gauss and Newton's step by the ``slope`` (n, k) of what is ``left`` (n,), damped, 1 at most."""
+    normal = slope.T @ slope
+    weight = damping * np.diag(normal) + 1e-9 * np.trace(normal) + 1e-300
+    made: Array = np.clip(np.linalg.solve(normal + np.diag(weight), slope.T @ left), -1.0, 1.0)
+    return made
+
+
 def _effective(left: Array) -> float:
     """How many samples a residual (n, signals) is worth, by its correlation from one to the next."""
     count = 0.0

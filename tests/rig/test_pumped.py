@@ -97,6 +97,20 @@ def test_a_pump_that_starts_with_the_log_has_left_its_volume_before(roles, flow)
     assert sum(told) <= 1
 
 
+@pytest.mark.parametrize("roles", [("output",), ("pressure", "output")], ids=["A", "B"])
+@pytest.mark.parametrize("since", [2, 8])
+def test_a_pump_that_is_on_its_way_has_been_left_anywhere_before(roles, since):
+    """It has stood at 14 for long; the last stroke began 0.1 or 0.4 s before the log, and shows no other."""
+    rig = RIGS["whole"]
+    flows = np.r_[
+        np.full(60, 5.0), np.zeros(600), np.full(20, -3.0), np.zeros(60), np.full(40, 2.0), np.zeros(60)
+    ]
+    for seed in range(4):
+        whole, _ = logged(rig, roles, flows, noise=0.005, seed=seed)
+        log = cut(whole, 660 + since)
+        assert left(rig, begun(rig, [log])) < 0.04 * left(rig, [log])
+
+
 @pytest.mark.parametrize("roles", SETS.values(), ids=SETS)
 def test_a_bladder_that_begins_empty_stands_at_0(roles):
     for seed in range(10):
