@@ -16,6 +16,7 @@ import numpy as np
 
 from focgen.diagnosis.fitting.fit import WHITE, Fit, fit
 from focgen.diagnosis.hypotheses.nuisances import problem_of
+from focgen.diagnosis.problem.problem import tells_what_is_held
 from focgen.diagnosis.problem.segments import Segment, cuts, make
 from focgen.logs.begin import REST, Begin
 from focgen.logs.experiment import Experiment
@@ -127,8 +128,8 @@ def _ways(rig: Rig, segment: Segment, logs: Sequence[Experiment], past: float) -
     first, last = segment.run.spans[len(earlier)]
     start, h = float(segment.run.clock[first]), segment.run.h
 
-    def made(begin: Begin) -> np.ndarray:
-        run = Run.of([last - first], [start], h, [begin])
+    def made(begin: Begin, stands: float = 0.0) -> np.ndarray:
+        run = Run.of([last - first], [start], h, [begin], stands=[stands])
         return Chain(rig).run(
             segment.x[first:last], segment.stages[0], segment.stages[-1], run, segment.between
         )
@@ -142,9 +143,17 @@ def _ways(rig: Rig, segment: Segment, logs: Sequence[Experiment], past: float) -
         changed += [(now - made(REST)) * (_SURE if begin.known else 1.0), *(left - now for left in longer)]
     if not changed:
         return np.zeros((0, last - first))
+    if tells_what_is_held(rig, segment.stages):
+        changed = _beside_the_volume(changed, made(begin, 1.0) - made(begin))
     _, sizes, axes = np.linalg.svd(np.stack(changed), full_matrices=False)
     found: np.ndarray = (sizes[:, None] * axes)[sizes > _SEEN * segment.level_out * np.sqrt(last - first)]
     return found
+
+
+def _beside_the_volume(changed: Sequence[np.ndarray], shift: np.ndarray) -> list[np.ndarray]:
+    """Rows (n,) without what another volume of a pump, which makes the ``shift`` (n,), does as well: it has a
+    number of its own, and what begins shift for good would be in no rig."""
+    return [row - (row @ shift) / max(shift @ shift, 1e-300) * shift for row in changed]
 
 
 def _rested(log: Experiment, earlier: Sequence[Experiment], role: str, past: float) -> Iterator[Begin]:

@@ -27,6 +27,11 @@ _STANDS = 0.1  # of the level: what a volume is off by that is told through an a
 _BASELINE = 0.005  # of the level: what the zero of a reading differs by from one experiment to the next
 
 
+def tells_what_is_held(rig: Rig, stages: Sequence[str]) -> bool:
+    """Whether what a pump holds is told through a stage behind it."""
+    return rig.integrator == "regulator" and stages[0] == "regulator" and len(stages) > 1
+
+
 @dataclass(frozen=True)
 class CandidateEffect:
     """An effect to be fitted: family, form, and the stage it is put in."""
@@ -106,8 +111,8 @@ class Problem:
     def stood(self) -> int:
         """How many experiments began with what a pump held, told through an actuator: what that makes of it
         is known no better than the rig."""
-        through = self.segment.stages[0] == "regulator" and len(self.segment.stages) > 1
-        return len(self.segment.run.stands) if through and self.nominals.rig.integrator == "regulator" else 0
+        told = tells_what_is_held(self.nominals.rig, self.segment.stages)
+        return len(self.segment.run.stands) if told else 0
 
     @cached_property
     def excitation(self) -> Excitation:
