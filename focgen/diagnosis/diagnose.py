@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -213,8 +213,8 @@ def _others(nominal: Rig, e: Explanation, session: Sequence[Experiment]) -> Iter
     yield from list(known.values())[1:]
     if e.predictability.share > NUMBERS.left:
         others = sorted((name for name in e.errors if name not in known), key=lambda name: e.errors[name])
-        fits = (alone(nominal, e.segment, session, name) for name in others[:_RIVALS])
-        yield from (fit for fit in fits if fit is not None)
+        fits = (alone(nominal, e.segment, session, name) for name in others)
+        yield from islice((fit for fit in fits if fit is not None), _RIVALS)
 
 
 def _told_by(

@@ -26,11 +26,11 @@ _WIDER = 1.1  # times as long ago as it is, the earliest window of a past may be
 def with_past(x: Array, run: Run) -> Array:
     """The input (n,) of a run with what was before each experiment ahead of it."""
     made, before = [], 0.0
-    for (past, lasts), (first, last) in zip(_told(run).pasts, run.spans):
-        # the last level lasts for what a pause has less than whole samples
-        if lasts > _SLACK and len(past):
+    for (past, sooner), (first, last) in zip(_told(run).pasts, run.spans):
+        # a pause that is no whole number of samples ends so much of one sooner
+        if sooner > _SLACK and len(past):
             past = past.copy()
-            past[0] += lasts * (before - past[0])
+            past[0] += sooner * (before - past[0])
         made += [past, x[first:last]]
         before = x[last - 1]
     return np.concatenate(made)

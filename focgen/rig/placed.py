@@ -35,7 +35,7 @@ class Placed:
         return self.form.leaves(x, self.values, self._own(run)) if self.form.leaves else {}
 
     def _own(self, run: Run) -> Run:
-        if run.lasts and self.remembers:
+        if run.lasts and self.remembers and not self.form.adds_up:  # a pump's is told from where each stood
             run = run.unbroken
         return replace(run, carried=self.carried) if self.carried else run
 

@@ -23,7 +23,7 @@ CONSTANTS = {
     "hypotheses/converter.py": ["_EASED", "_PINNED"],
     "hypotheses/disturbance.py": ["SLOWEST"],
     "hypotheses/explain.py": ["_BELIEVED", "_HELD", "_KEPT"],
-    "hypotheses/initial.py": ["_EXACT", "_LEVEL", "_REST", "_SEEN", "_SHOWN", "_SURE"],
+    "hypotheses/initial.py": ["_EXACT", "_HELD", "_LEVEL", "_REST", "_SEEN", "_SHOWN", "_SURE"],
     "hypotheses/left.py": ["_ERRORS", "_OFF", "_STILL"],
     "hypotheses/level_pace.py": ["_PART"],
     "hypotheses/nuisances.py": ["_GAUGE", "_OUT_OF_STEP", "_SMOOTHER"],

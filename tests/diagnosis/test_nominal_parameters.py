@@ -10,13 +10,14 @@ import pytest
 
 from focgen.diagnosis.diagnose import diagnose, explain_all
 from focgen.diagnosis.fitting.fit import WHITE, fit
+from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.factors import factors
 from focgen.diagnosis.problem.nominal_parameters import NominalParameters
 from focgen.diagnosis.problem.segments import make
 from focgen.diagnosis.verdict import compose, conclude
-from focgen.diagnosis.verdict.moves import far_moves
+from focgen.diagnosis.verdict.moves import at_the_end, far_moves
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig.replay import simulate_session
 from focgen.rig.rig import Delays, LinearActuator, Relative, Uncertainty
@@ -202,6 +203,22 @@ def test_beside_a_number_that_was_moved_far_no_name_is_sure(monkeypatch):
     assert confidence(only=["valve_asymmetry"]) == (sure, True)
     unsure, said = confidence()
     assert unsure <= 0.9 * 0.96 and said
+
+
+@pytest.mark.parametrize("moved, said", [(0.4, "T by -60 %"), (1.6, "T by +60 %"), (0.45, "a number of")])
+def test_a_number_at_the_end_of_its_range_is_said(moved, said):
+    rig = replace(RIG, uncertainty=Uncertainty(actuator=Relative(0.2, 0.2, 0.1)))
+    (line,) = at_the_end(rig, replace(rig, actuator=replace(rig.actuator, T=moved * rig.actuator.T)))
+    assert said in line and line.endswith("or what is named beside it")
+
+
+def test_beside_a_number_at_the_end_of_its_range_no_name_is_sure(monkeypatch):
+    """A tip on a spring was a slow sensor at 0.95, beside a T that would have gone on below 40 %."""
+    logs = session(11, vent=0.5)
+    monkeypatch.setattr(Explanation, "strained", property(lambda e: True))
+    found = diagnose(RIG, logs, pictures=False)
+    assert found.causes[0].candidates[0].confidence < 0.7
+    assert any("as far as it lets one go" in note for note in found.notes)
 
 
 @pytest.mark.parametrize(

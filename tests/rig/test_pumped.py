@@ -207,6 +207,19 @@ def test_what_a_pump_does_not_move_is_not_made_up_for(less, asked, rate, gap, st
     assert not fits_in(effect.form, "regulator", replace(pump, regulator=SENSOR))
 
 
+@pytest.mark.parametrize("lasts", [False, True])
+def test_a_spindle_lies_in_its_gap_as_the_log_before_left_it(lasts):
+    """A stroke up, and in the next log one down, of which the gap takes all of its width: the piston was
+    pushed up last. Red when the next log's begin, which is told from where it stood, drags it back."""
+    pump = replace(RIGS["whole"], regulator=TransferFunction([(1.0, 0.0)], [(1.0, 1.0)]))
+    up = np.r_[np.zeros(5), np.full(20, 3.0), np.zeros(5)]
+    run = Run.of([30, 30], [0.0, 30 * H], H, lasts=lasts, stands=[0.0, 2.6])
+    lost = placed("valve_stiction", "lost_motion", 0.4)
+    made = Chain(pump, (lost,)).run(np.r_[up, -up], "regulator", "regulator", run)
+    stroke = 20 * H * 3.0
+    np.testing.assert_allclose(made[[29, 30, 59]], [stroke - 0.4, 2.6, 2.6 - (stroke - 0.8)], atol=0.02)
+
+
 def test_a_volume_is_told_through_a_curve():
     """Red when what a pump held is told as if the actuator did not bend what it makes of it."""
     rig, curve = RIGS["whole"], placed("gain_nonlinearity", "force_factor", 0.5, 0.0, 12.0, stage="actuator")

@@ -69,6 +69,7 @@ def settled(of: Fit) -> Fit:
     return fit(of.problem, _to_the_path(of).vector, WHITE, 0) if of.problem.segment.pace else of
 
 
+@lru_cache(maxsize=4)
 def as_it_shows(of: Fit) -> Fit:
     """A fit by which it is seen what the rig does: to its whole path where a pump makes that, which adds up
     without further errors; others as they are."""
@@ -76,7 +77,6 @@ def as_it_shows(of: Fit) -> Fit:
     return _to_the_path(of) if pumped else of
 
 
-@lru_cache(maxsize=8)
 def _to_the_path(of: Fit) -> Fit:
     problem = of.problem
     plain: Problem = replace(problem, segment=replace(problem.segment, pace=0.0), memory={})

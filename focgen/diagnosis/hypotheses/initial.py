@@ -35,6 +35,7 @@ _LONGER = 2.0  # times as long ago each further window ends,
 _SHOWN = 0.08  # of how long the rig remembers: what is longer ago is one window
 _SURE = 0.1  # of what earlier logs left: by what it may be off where they are all that was
 _REST = 0.3  # of a rest of unknown length: by what it may be longer, a standard deviation
+_HELD = 0.1  # of what a pump held: by so much it is changed to see what that does
 _EXACT = 1e-12  # of the output's level squared: less is no noise, but rounding
 _SEEN = 1e-3  # of the output's largest magnitude, in root mean square: less does not show
 
@@ -143,8 +144,9 @@ def _ways(rig: Rig, segment: Segment, logs: Sequence[Experiment], past: float) -
         changed += [(now - made(REST)) * (_SURE if begin.known else 1.0), *(left - now for left in longer)]
     if not changed:
         return np.zeros((0, last - first))
-    if tells_what_is_held(rig, segment.stages):
-        changed = _beside_the_volume(changed, made(begin, 1.0) - made(begin))
+    stood = segment.run.stands[len(earlier)] if segment.run.stands else 0.0
+    if stood and tells_what_is_held(rig, segment.stages):
+        changed = _beside_the_volume(changed, made(begin, (1.0 + _HELD) * stood) - made(begin, stood))
     _, sizes, axes = np.linalg.svd(np.stack(changed), full_matrices=False)
     found: np.ndarray = (sizes[:, None] * axes)[sizes > _SEEN * segment.level_out * np.sqrt(last - first)]
     return found

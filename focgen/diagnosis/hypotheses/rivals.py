@@ -182,7 +182,7 @@ def _other_forms(name: str, of: Fit, best: Fit, ranking: Ranking, beside: Beside
 
 def change_of(of: Fit, without: Fit) -> float:
     """The root mean square of what a fit's output is another by than ``without``, over that of what it
-    leaves."""
+    leaves; of a pump's whole path, to which both are fitted anew."""
     left, before = (problem_residual(as_it_shows(f)) for f in (of, without))
     change = left - before
     return float(np.sqrt(np.mean(change**2) / max(np.mean(left**2), 1e-300)))

@@ -1,6 +1,7 @@
 """Whether a family leaves far less than what was found, where the logs begin in another way: one that is slow
 with all earlier logs ahead, or one that stays where the log before left it. Where every log is taken to begin
-at rest, these are lost to a drift. A search in earnest takes seconds, so each is fitted on means first.
+at rest, these are lost to a drift. A search in earnest takes seconds, so that the numbers of each are fitted
+to means of samples first.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from focgen.rig.effects import Effect, library
 from focgen.rig.rig import Rig
 from focgen.rig.session import run_of
 
-_NEAR = 1.1  # times what is asked: with so much left on means, a search may leave less
+_NEAR = 1.1  # times what is asked: where numbers of means leave so much, a search may leave less
 
 Ahead = Sequence[tuple[Experiment, ...]]
 """A session with all earlier logs ahead of every log, by one pause between them or another."""
@@ -33,8 +34,8 @@ def families_in(e: Explanation, are: Callable[[Effect], bool]) -> list[str]:
 
 def suits_what_is_slow(nominal: Rig, e: Explanation, ahead: Ahead) -> tuple[Experiment, ...] | None:
     """Of the sessions ``ahead``, the one by which the first slow family that leaves far less than what was
-    found leaves least; None where none does. Families are searched in earnest where their likeliest form
-    comes near to that by itself."""
+    found leaves least; None where none does. A family is searched in earnest where its likeliest form by
+    itself leaves little more than what was found."""
     least: float = NUMBERS.unlikely * e.square
     for name in families_in(e, lambda f: f.slow):
         if e.best.problem.families == (name,):  # what it left in later logs is asked of what was found
@@ -51,7 +52,8 @@ def suits_what_is_slow(nominal: Rig, e: Explanation, ahead: Ahead) -> tuple[Expe
 
 
 def alone(nominal: Rig, segment: Segment, logs: Sequence[Experiment], name: str) -> Fit | None:
-    """A family's likeliest form by itself, on means of samples; None where it has none here."""
+    """A family's likeliest form by itself, its numbers fitted to means of samples; None where it has none
+    here."""
     problem = uncertain(nominal, segment, logs)
     forms = [c for c in candidates_for(problem.segment, nominal) if c.effect == name]
     return likeliest_on_all(problem, problem.nominal(), forms)
@@ -74,4 +76,5 @@ def leaves_less_beside(nominal: Rig, e: Explanation, logs: Sequence[Experiment],
 def _left(e: Explanation, fit: Fit, ahead: Ahead) -> list[float]:
     """The mean squares that a fit for the first of the sessions ``ahead`` leaves, made anew for each."""
     fits = (fit if logs is ahead[0] else begun_as(e, fit, logs) for logs in ahead)
-    return [float(np.mean(of.weighed**2)) for of in fits]
+    squares = (float(np.mean(of.weighed**2)) for of in fits)
+    return [square if np.isfinite(square) else np.inf for square in squares]

@@ -65,6 +65,7 @@ def conclude(
     made, squares, floor, total = summary.made, summary.squares, summary.floor, summary.total
     far = far_moves(rig, summary.rigs.fitted if summary.causes else summary.rigs.refitted)
     trust = NUMBERS.smaller if far and not granted else 1.0
+    strained = any(e.strained for e, _ in summary.causes)
     found = _ordered([_found(e, c, summary, logs, trust) for e, c in summary.causes])
     found += _departures(controller)
     word = _word(found, unknown, [e for e in explanations if e.kept_by(rig, summary.rigs.refitted)])
@@ -86,7 +87,7 @@ def conclude(
             *of_file(rig),
             *notes_of(logs),
             *far,
-            *(at_the_end(rig, summary.rigs.fitted) if summary.causes else ()),
+            *(at_the_end(rig, summary.rigs.fitted) if strained and not far else ()),
             *cautions(summary.causes, unknown, list(doubted), [*off, *nominal_alone(explanations, off)]),
             *lesser(stands.beside),
             *the_rest(summary),

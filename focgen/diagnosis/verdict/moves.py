@@ -6,11 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from focgen.diagnosis.problem.factors import WITHIN
+from focgen.diagnosis.problem.factors import LEAST, WITHIN
 from focgen.diagnosis.problem.free import factor_ends
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig.rig import Actuator, LinearActuator, Relative, Rig
 
+_EITHER = "either that is wrong, or what is named beside it"
 _SLACK = 1e-4  # of a number: what stands at the end of its range is not beyond it
 
 
@@ -25,13 +26,20 @@ def far_moves(given: Rig, refitted: Rig) -> tuple[str, ...]:
 
 
 def at_the_end(given: Rig, refitted: Rig) -> tuple[str, ...]:
-    """A line for each number of the actuator that the refit moved as far as it lets one go."""
-    return tuple(
-        f"the refit moves the {stage}'s {what} by {100 * moved:+.3g} %, which is as far as it lets a number "
-        f"go whose uncertainty is {100 * known:.3g} %: it may be that, or something else, that is wrong"
+    """A line for each number of the actuator that the refit moved as far as it lets one go; one of all of
+    them where it is a gain's curve, which moves as a whole."""
+    found = [
+        f"the refit moves the actuator's {what} by {100 * moved:+.3g} %, which is as far as it lets a number "
+        f"go whose uncertainty is {100 * known:.3g} %: {_EITHER}"
         for stage, what, moved, known in _moves(given, refitted)
-        if stage == "actuator" and known and abs(abs(moved) - WITHIN * known) <= _SLACK
-    )
+        if stage == "actuator" and what != "delay" and known and _is_at_the_end(moved, known)
+    ]
+    return tuple(found) or (f"the refit moves a number of the actuator as far as it lets one go: {_EITHER}",)
+
+
+def _is_at_the_end(moved: float, known: float) -> bool:
+    end = WITHIN * known if moved > 0.0 else min(WITHIN * known, 1.0 - LEAST)
+    return abs(abs(moved) - end) <= _SLACK
 
 
 def _moves(given: Rig, refitted: Rig) -> Iterator[tuple[str, str, float, float]]:

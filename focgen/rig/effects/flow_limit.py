@@ -40,7 +40,7 @@ def _driven(x: Array, values: Values, run: Run) -> Array:
 
 
 _DRIVEN = Parameter("most", level=1, lower=0.1, upper=1.3, starts=(0.95, 0.75, 0.5), zero=1.3)
-# of all that is there in a response: no pump fills its bladder so quickly
+# of the largest volume in a response time: a pump takes longer to fill what is behind it
 _PUMPED = replace(RATE, starts=(0.5, 0.25, 0.12, 0.06, 0.03))
 
 EFFECT = Effect(
