@@ -10,7 +10,10 @@ import numpy as np
 import pytest
 
 from focgen.diagnosis.diagnose import diagnose
+from focgen.diagnosis.problem.problem import may_have_held
+from focgen.logs.begin import REST, Begin
 from focgen.logs.experiment import Experiment
+from focgen.rig.effects import Run
 from tests.diagnosis.test_held import GAIN, LAG, NOISE, PARTS, RIG, H
 
 
@@ -55,6 +58,16 @@ def test_what_a_pump_does_not_move_is_named(fault, effect, size):
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_pump_that_moves_all_of_it_is_healthy(seed):
     assert diagnose(RIG, session(seed), pictures=False).verdict in ("none", "parameters")
+
+
+def test_what_a_pump_held_may_be_off_unless_it_was_empty_and_at_rest():
+    begins = [REST, Begin((0.0, 2.0), (0.3,)), REST]
+    assert may_have_held(Run.of([5] * 3, [0.0, 1.0, 2.0], H, begins, stands=[0.0, 0.0, 3.0])) == (
+        False,
+        True,
+        True,
+    )
+    assert may_have_held(Run.of([5], [0.0], H)) == (False,)
 
 
 @pytest.mark.parametrize("seed", [1, 2])

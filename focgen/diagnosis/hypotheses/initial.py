@@ -16,7 +16,7 @@ import numpy as np
 
 from focgen.diagnosis.fitting.fit import WHITE, Fit, fit
 from focgen.diagnosis.hypotheses.nuisances import problem_of
-from focgen.diagnosis.problem.problem import tells_what_is_held
+from focgen.diagnosis.problem.problem import may_have_held, tells_what_is_held
 from focgen.diagnosis.problem.segments import Segment, cuts, make
 from focgen.logs.begin import REST, Begin
 from focgen.logs.experiment import Experiment
@@ -35,7 +35,7 @@ _LONGER = 2.0  # times as long ago each further window ends,
 _SHOWN = 0.08  # of how long the rig remembers: what is longer ago is one window
 _SURE = 0.1  # of what earlier logs left: by what it may be off where they are all that was
 _REST = 0.3  # of a rest of unknown length: by what it may be longer, a standard deviation
-_HELD = 0.1  # of what a pump held: by so much it is changed to see what that does
+_HELD = 0.1  # of the most that a pump holds: by so much more it held, to see what that does
 _EXACT = 1e-12  # of the output's level squared: less is no noise, but rounding
 _SEEN = 1e-3  # of the output's largest magnitude, in root mean square: less does not show
 
@@ -129,11 +129,9 @@ def _ways(rig: Rig, segment: Segment, logs: Sequence[Experiment], past: float) -
     first, last = segment.run.spans[len(earlier)]
     start, h = float(segment.run.clock[first]), segment.run.h
 
-    def made(begin: Begin, stands: float = 0.0) -> np.ndarray:
+    def made(begin: Begin, stands: float = 0.0, stage: str = segment.stages[-1]) -> np.ndarray:
         run = Run.of([last - first], [start], h, [begin], stands=[stands])
-        return Chain(rig).run(
-            segment.x[first:last], segment.stages[0], segment.stages[-1], run, segment.between
-        )
+        return Chain(rig).run(segment.x[first:last], segment.stages[0], stage, run, segment.between)
 
     begin, changed = segment.run.begins[len(earlier)], []
     if not begin.known:
@@ -144,9 +142,10 @@ def _ways(rig: Rig, segment: Segment, logs: Sequence[Experiment], past: float) -
         changed += [(now - made(REST)) * (_SURE if begin.known else 1.0), *(left - now for left in longer)]
     if not changed:
         return np.zeros((0, last - first))
-    stood = segment.run.stands[len(earlier)] if segment.run.stands else 0.0
-    if stood and tells_what_is_held(rig, segment.stages):
-        changed = _beside_the_volume(changed, made(begin, (1.0 + _HELD) * stood) - made(begin, stood))
+    if tells_what_is_held(rig, segment.stages) and may_have_held(segment.run)[len(earlier)]:
+        stood = segment.run.stands[len(earlier)] if segment.run.stands else 0.0
+        more = stood + _HELD * float(np.max(np.abs(made(begin, stood, "regulator"))))
+        changed = _beside_the_volume(changed, made(begin, more) - made(begin, stood))
     _, sizes, axes = np.linalg.svd(np.stack(changed), full_matrices=False)
     found: np.ndarray = (sizes[:, None] * axes)[sizes > _SEEN * segment.level_out * np.sqrt(last - first)]
     return found

@@ -13,6 +13,7 @@ import numpy as np
 from focgen.diagnosis.problem.excitation import excitation
 from focgen.diagnosis.problem.nominal_parameters import NominalParameters
 from focgen.diagnosis.problem.segments import Segment
+from focgen.logs.begin import REST
 from focgen.rig.effects import Effect, Excitation, Form, Parameter, Run, library
 from focgen.rig.engine import Chain
 from focgen.rig.placed import Placed, slot_in
@@ -30,6 +31,12 @@ _BASELINE = 0.005  # of the level: what the zero of a reading differs by from on
 def tells_what_is_held(rig: Rig, stages: Sequence[str]) -> bool:
     """Whether what a pump holds is told through a stage behind it."""
     return rig.integrator == "regulator" and stages[0] == "regulator" and len(stages) > 1
+
+
+def may_have_held(run: Run) -> tuple[bool, ...]:
+    """By experiment: whether what a pump held as it began may be off; not where it began empty, at rest."""
+    stands, begins = run.stands or (0.0,) * len(run.spans), run.begins or (REST,) * len(run.spans)
+    return tuple(stood != 0.0 or not begin.at_rest for stood, begin in zip(stands, begins))
 
 
 @dataclass(frozen=True)
@@ -111,8 +118,8 @@ class Problem:
     def stood(self) -> int:
         """How many experiments began with what a pump held, told through an actuator: what that makes of it
         is known no better than the rig."""
-        told = tells_what_is_held(self.nominals.rig, self.segment.stages)
-        return len(self.segment.run.stands) if told else 0
+        told, run = tells_what_is_held(self.nominals.rig, self.segment.stages), self.segment.run
+        return len(run.spans) if told and any(may_have_held(run)) else 0
 
     @cached_property
     def excitation(self) -> Excitation:
@@ -317,8 +324,9 @@ class Problem:
         return self._held(vector[self.head - self.stood : self.head]) if self.stood else ()
 
     def _held(self, stood: np.ndarray) -> tuple[float, ...]:
-        off = _STANDS * self.nominals.level_in * stood
-        return tuple(float(s + o) if s else s for s, o in zip(self.segment.run.stands, off))
+        off, run = _STANDS * self.nominals.level_in * stood, self.segment.run
+        stands = run.stands or (0.0,) * len(run.spans)
+        return tuple(float(s + o) if free else s for s, o, free in zip(stands, off, may_have_held(run)))
 
     def begun(self, vector: np.ndarray) -> np.ndarray:
         """How far each of the segment's ``loose`` ways (k,) is there."""
