@@ -282,7 +282,7 @@ class _Setting:
         most = asked.cost * rest.cost
         tries = [t for t in (*further, *self.tries()) if off(t) < asked.mended and t.cost < most]
         if tries and ENTERS[self.entry] == self.chain.rig.integrator:
-            return likeliest([*tries, *self._from_anywhere()], _IDLE.nats).begin  # nothing asks for a stroke
+            return likeliest([*tries, *self._from_anywhere()], _IDLE.nats).begin  # a stroke has to earn its place
         if not tries:
             return REST
         sure = np.max(rest.first) > asked.far and min(map(off, tries)) < asked.surely
@@ -291,7 +291,7 @@ class _Setting:
         return likeliest(tries if sure else [rest, *tries], asked.nats).begin
 
     def _from_anywhere(self) -> list[Try]:
-        """The same of a stage that adds up, which may have stood anywhere before."""
+        """A rest, and the tries, of a stage that adds up and may have stood anywhere before what moves it."""
         of = copy(self)
         of.anywhere = True
         rest = of.at(REST, 0)
