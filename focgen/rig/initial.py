@@ -282,7 +282,7 @@ class _Setting:
         most = asked.cost * rest.cost
         tries = [t for t in (*further, *self.tries()) if off(t) < asked.mended and t.cost < most]
         if tries and ENTERS[self.entry] == self.chain.rig.integrator:
-            return likeliest([*tries, *self._from_anywhere()], _IDLE.nats).begin  # a stroke has to earn its place
+            return likeliest([*tries, *self._from_anywhere()], _IDLE.nats).begin  # a stroke is asked for
         if not tries:
             return REST
         sure = np.max(rest.first) > asked.far and min(map(off, tries)) < asked.surely
