@@ -82,6 +82,12 @@ class Explanation:
         return float(np.mean(self.best.weighed**2))
 
     @property
+    def zero(self) -> float:
+        """By what its readings' zero is off, in the log's unit, where that is more than the noise; else 0."""
+        off, noise = self.best.problem.zero(self.best.vector), self.segment.level_out * self.square**0.5
+        return off if abs(off) > noise else 0.0
+
+    @property
     def stage(self) -> str | None:
         """The one stage this segment is, None where stages are merged."""
         return self.segment.stages[0] if len(self.segment.stages) == 1 else None

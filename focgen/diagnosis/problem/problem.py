@@ -19,7 +19,7 @@ from focgen.rig.engine import Chain
 from focgen.rig.placed import Placed, slot_in
 from focgen.rig.rig import Rig
 
-_ZERO = 0.03  # of the level: an offset that is no fault
+_ZERO = 1.0  # of the level: as far as a zero is looked for, which no effect of the library is
 _ALIGNED = 0.5  # of the slack of columns: what a standard deviation is; a delay is to be called one
 _OFF = 3.0  # standard deviations that an input may be off in each way
 _FAR_OFF = 20.0  # the same of a zero that no effect moves
@@ -319,6 +319,11 @@ class Problem:
         run = self.segment.fed.run
         return replace(run, stands=self._held(stood)) if stood.any() else run
 
+    def zero(self, vector: np.ndarray) -> float:
+        """What the output reads where nothing moves, in the log's unit; 0 where the rig has an offset."""
+        gauges = vector[len(self.nominal_start) + 1 :]
+        return 0.0 if self.nominals.has_offset else float(gauges[0]) * self.segment.level_out
+
     def held(self, vector: np.ndarray) -> tuple[float, ...]:
         """What a pump held as each experiment began; none where that is known."""
         return self._held(vector[self.head - self.stood : self.head]) if self.stood else ()
@@ -339,8 +344,10 @@ class Problem:
         return np.repeat(zeros * _BASELINE * self.segment.level_out, lengths)
 
     def level(self, vector: np.ndarray) -> np.ndarray:
-        """``vector`` with the zeros of all experiments alike."""
+        """``vector`` with the zeros of all experiments alike, and where no offset is of the rig at none."""
         alike = vector.copy()
+        if not self.nominals.has_offset:
+            alike[len(self.nominal_start) + 1] = 0.0
         alike[self.head - self.zeros - self.stood : self.head - self.stood] = 0.0
         return alike
 

@@ -105,6 +105,20 @@ def _instead(e: Explanation) -> Iterator[str]:
             yield f"{_within(e)}: {other.said}"
 
 
+def zeros_off(rig: Rig, explanations: Iterable[Explanation]) -> Iterator[str]:
+    """Where the zero of a signal is off against the one ahead of it."""
+    for e in explanations:
+        if zero := e.zero:
+            entry, exit = e.segment.entry, e.segment.exit
+            unit = rig.signals.unit_of(exit) or f"of {getattr(rig.signals, exit)}"
+            kept, more = exit == "output" and rig.actuator is not None, "more" if zero > 0 else "less"
+            yield (
+                f"{_within(e)}: the {exit} reads {abs(zero):.3g} {unit} {more} than the {entry} tells, "
+                "at every level; the zero of one of them is off"
+                + (", and refitted.toml has it in the actuator's offset" if kept else "")
+            )
+
+
 def paced(explanations: Iterable[Explanation]) -> Iterator[str]:
     """Where a time that depends on the level, within its uncertainty, explains what was not called a gap."""
     for e in explanations:

@@ -22,6 +22,8 @@ from focgen.rig.replay import effect_tables, simulate_session
 from focgen.rig.rig import Rig
 from focgen.rig.session import joined, run_of
 
+_SHOWN = 1e-3  # of the output's level: less of a zero shows in no reading
+
 
 @dataclass(frozen=True, eq=False)
 class Rigs:
@@ -69,13 +71,29 @@ def _after(
 def compose(rig: Rig, explanations: Sequence[Explanation], logs: Sequence[Experiment]) -> Rigs:
     """Own parameters and effects from all segments. Each was fitted by itself: where the output of the whole
     chain comes no closer by it, as where what one stage's refit makes up for is mended in another, segments
-    keep what was given; those with effects keep what was fitted beside them."""
+    keep what was given; those with effects keep what was fitted beside them. The zero of a sensor's reading
+    is put into the actuator's offset."""
     placed = tuple(p for e in explanations for p in e.best.problem.placed(e.best.vector))
     beside = [e.best for e in explanations if e.best.problem.candidates]
     alone = [e.best for e in explanations if not e.best.problem.candidates]
     refitted = _closest(rig, [e.nominal for e in explanations], (), logs)
-    fitted = _closest(_moved(rig, beside), alone, placed, logs) if placed else refitted
-    return Rigs(refitted, fitted, placed)
+    refitted = _with_zero(refitted, explanations[-1].nominal, (), logs)
+    if not placed:
+        return Rigs(refitted, refitted, placed)
+    fitted = _closest(_moved(rig, beside), alone, placed, logs)
+    return Rigs(refitted, _with_zero(fitted, explanations[-1].best, placed, logs), placed)
+
+
+def _with_zero(rig: Rig, last: Fit, placed: Sequence[Placed], logs: Sequence[Experiment]) -> Rig:
+    """The rig with the zero that the last segment's readings have in the actuator's offset, where that brings
+    the output closer: a sensor has none in its file, and no log tells whether its zero is off or that of the
+    gauge ahead of it."""
+    zero, actuator = last.problem.zero(last.vector), rig.actuator
+    if actuator is None or abs(zero) < _SHOWN * last.problem.segment.level_out:
+        return rig
+    ahead = zero / rig.sensor.dc_gain
+    found = replace(rig, actuator=replace(actuator, offset=actuator.offset + ahead))
+    return found if _gap(found, placed, logs) < _gap(rig, placed, logs) else rig
 
 
 def _closest(rig: Rig, fits: Sequence[Fit], placed: Sequence[Placed], logs: Sequence[Experiment]) -> Rig:

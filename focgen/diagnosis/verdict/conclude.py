@@ -25,6 +25,7 @@ from focgen.diagnosis.verdict.cautions import (
     paced,
     rounded,
     the_rest,
+    zeros_off,
 )
 from focgen.diagnosis.verdict.confidence import tied
 from focgen.diagnosis.verdict.evidence import Evidence
@@ -68,7 +69,8 @@ def conclude(
     strained = any(e.strained for e, _ in summary.causes)
     found = _ordered([_found(e, c, summary, logs, trust) for e, c in summary.causes])
     found += _departures(controller)
-    word = _word(found, unknown, [e for e in explanations if e.kept_by(rig, summary.rigs.refitted)])
+    refitted = [e for e in explanations if e.zero or e.kept_by(rig, summary.rigs.refitted)]
+    word = _word(found, unknown, refitted)
     if controller is not None and controller.large and not found:
         word = "unknown"
     shares = stage_shares(found, unknown, explanations)
@@ -92,6 +94,7 @@ def conclude(
             *lesser(stands.beside),
             *the_rest(summary),
             *ended(summary.causes),
+            *zeros_off(rig, explanations),
             *paced(explanations),
             *rounded(explanations),
             *gauges(stands.at_odds),
@@ -142,7 +145,9 @@ def _word(found: Sequence[Found], unknown: Sequence[Explanation], explanations: 
 
 
 def _moved(e: Explanation) -> bool:
-    """Whether refitting the nominal parameters closed a gap beyond the noise."""
+    """Whether refitting the nominal parameters, or the zero of a reading, closed a gap beyond the noise."""
+    if e.zero:
+        return True
     problem, weighing = e.nominal.problem, Weighing(e.ar)
     own = len(problem.nominal_start)
     if not own:
