@@ -64,6 +64,7 @@ class Chain:
             left[:] = [{} for _ in self.placed]
         if run.begins:
             return self._begun(x, first, last, run, between, tap, left)
+        tapped = {} if tap is None else tap
         begin, end = STAGES.index(first), STAGES.index(last)
         keeps = {p.stage for p in self.placed if p.remembers and p.slot in EQUATIONS.values()}
         before, behind = run, run.held(x) if run.lasts else run
@@ -79,11 +80,17 @@ class Chain:
             if run.stands and stage == self.rig.integrator:
                 x, run = self._once("stood", run.stands, x, from_there, run), run.stood
                 before = behind = run
-            if tap is not None:
-                tap[stage] = x
+            if stage == "actuator" and self._offset:
+                before, behind, run = before.balanced, behind.balanced, run.balanced
+            tapped[stage] = x
             if between != Between.STRAIGHT and not self._passes(stage):
                 between = Between.STRAIGHT
         return x
+
+    @property
+    def _offset(self) -> float:
+        """Where the actuator rests."""
+        return 0.0 if self.rig.actuator is None else self.rig.actuator.offset
 
     def _passes(self, stage: str) -> bool:
         """Whether a stage leaves what its input does between samples as it is."""
@@ -136,8 +143,7 @@ class Chain:
         steps = [_effect(p) for p in here if p.slot in early]
         steps += self._core(stage, here, between)
         steps += [_effect(p) for p in here if p.slot in late]
-        if stage == "actuator" and self.rig.actuator is not None and self.rig.actuator.offset:
-            offset = self.rig.actuator.offset
+        if stage == "actuator" and (offset := self._offset):
             steps.append((("offset", offset), lambda x, run: x + offset, None))
         return steps + [_effect(p) for p in here if p.slot == "place"]
 

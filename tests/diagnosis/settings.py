@@ -45,6 +45,7 @@ CONSTANTS = {
     "proposals/identifiability.py": ["ALIKE", "HIDDEN", "_FINE", "_LONGEST"],
     "proposals/limits.py": ["_BELOW", "_BEYOND", "_JUMP", "_LEAST", "_LONGEST", "_MARGIN"],
     "verdict/clocks.py": ["_SETTLED"],
+    "verdict/compose.py": ["_SHOWN"],
     "verdict/evidence.py": ["_STILL"],
     "verdict/moves.py": ["_SLACK"],
     "verdict/sizes.py": ["_SLACK"],

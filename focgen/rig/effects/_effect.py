@@ -131,6 +131,11 @@ class Run:
         rest[firsts[np.array(self.stands) != 0.0]] = 2
         return replace(self, rest=rest, stands=())
 
+    @cached_property
+    def balanced(self) -> Run:
+        """The run behind what lies at a level of its own where the rig rests, in equilibrium with that."""
+        return replace(self, rest=np.where(self.rest == 1, 2, self.rest).astype(self.rest.dtype))
+
     @property
     def stood_by_span(self) -> list[tuple[int, int, float]]:
         """Every span, and where a stage that integrates stood as it began."""

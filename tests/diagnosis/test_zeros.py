@@ -1,0 +1,66 @@
+"""The zero of a reading: the commonest fault of a bench, and no effect of the rig.
+
+Red when a reading that is off by the same at every level is named a drift, or when the rigs that are written
+leave the output off by it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from focgen.diagnosis.diagnose import diagnose
+from focgen.rig.replay import replay
+from tests.diagnosis_rig import RIG, session
+
+DRIFTS = ("sensor_drift", "gain_drift", "sensor_nonlinearity")
+
+
+def off_by(logs, role, part):
+    """The logs with a column off by ``part`` of the largest of it, and by how much that is."""
+    zero = part * max(float(np.max(log[role])) for log in logs)
+    return [replace(log, signals=dict(log.signals) | {role: log[role] + zero}) for log in logs], zero
+
+
+def note_of(found, role):
+    (line,) = (line for line in found.notes if f"the {role} reads" in line)
+    return line
+
+
+@pytest.mark.parametrize(
+    "role, part",
+    [
+        ("output", 0.02),
+        ("output", -0.3),
+        ("pressure", 0.1),
+        ("curvature", 0.05),
+        *(pytest.param(*case, marks=pytest.mark.long) for case in (("output", 0.1), ("pressure", -0.4))),
+    ],
+)
+def test_a_zero_that_is_off_is_no_effect_and_in_the_rig(role, part):
+    """Of 2 % nothing was said, and the output stayed off by it; of 8 % it was a ``sensor_drift`` at 0.95."""
+    logs, zero = off_by(session(1), role, part)
+    found = diagnose(RIG, logs, pictures=False, only=None if part == 0.02 else DRIFTS)
+    assert found.verdict == "parameters" and not found.causes
+    assert found.gap.refitted < 1.1 * found.gap.floor
+    told = -zero if role == "curvature" else zero
+    line = note_of(found, "output" if role == "curvature" else role)
+    assert ("more" if told > 0.0 else "less") in line
+    assert float(line.split(" reads ")[1].split()[0]) == pytest.approx(abs(zero), rel=0.1)
+    replayed = replay(found.refitted, logs)
+    assert all(result.gof > 0.95 for result in replayed.logs.values())
+
+
+def test_an_effect_beside_a_zero_is_named_and_both_are_in_the_rig():
+    logs, zero = off_by(session(2, hysteresis=0.3), "output", 0.1)
+    found = diagnose(RIG, logs, pictures=False, only=("hysteresis",))
+    assert [c.candidates[0].effect for c in found.causes] == ["hysteresis"]
+    assert found.gap.explained < 1.5 * found.gap.floor < found.gap.refitted
+    assert found.augmented.actuator.offset == pytest.approx(zero, rel=0.1)
+
+
+def test_a_rig_as_given_has_no_zero_off():
+    found = diagnose(RIG, session(3), pictures=False)
+    assert found.verdict in ("none", "parameters") and not any(" reads " in line for line in found.notes)
