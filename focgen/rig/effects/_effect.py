@@ -131,10 +131,13 @@ class Run:
         rest[firsts[np.array(self.stands) != 0.0]] = 2
         return replace(self, rest=rest, stands=())
 
-    @cached_property
-    def balanced(self) -> Run:
-        """The run behind what lies at a level of its own where the rig rests, in equilibrium with that."""
-        return replace(self, rest=np.where(self.rest == 1, 2, self.rest).astype(self.rest.dtype))
+    def lying(self, x: Array, level: float) -> Run:
+        """The run behind what rests at a ``level`` of its own: an experiment in which its output ``x`` (n,)
+        comes from rest and begins there begins in equilibrium with it."""
+        firsts, rest = np.flatnonzero(self.rest == 1), self.rest.copy()
+        still = _STILL * max(float(x.max(initial=0.0)), -float(x.min(initial=0.0)))
+        rest[firsts[np.abs(x[firsts] - level) <= still]] = 2
+        return replace(self, rest=rest)
 
     @property
     def stood_by_span(self) -> list[tuple[int, int, float]]:
