@@ -121,7 +121,7 @@ def static_output(rig: Rig, pressure: Any) -> Any:
     """What the sensor reads at rest at ``pressure``, any shape."""
     actuator = actuator_of(rig)
     curvature = actuator.drive(pressure) * _static_gain(rig, "actuator") + actuator.offset
-    return curvature * _static_gain(rig, "sensor")
+    return curvature * _static_gain(rig, "sensor") + rig.zero
 
 
 def rest(rig: Rig, command: tuple[float, float]) -> Equilibrium:
@@ -134,7 +134,7 @@ def rest(rig: Rig, command: tuple[float, float]) -> Equilibrium:
     drive = float(actuator.drive(pressure))
     settled = drive * actuator.dynamics.dc_gain if drive else 0.0
     level = settled + actuator.offset
-    output = level * rig.sensor.dc_gain if level else 0.0
+    output = (level * rig.sensor.dc_gain if level else 0.0) + rig.zero
     if not math.isfinite(output):
         raise DesignError(
             rig.name, f"never rests at the command {idle:g}", "give a command range that holds 0"
@@ -147,7 +147,7 @@ def holding(rig: Rig, output: float, ranges: Ranges) -> Equilibrium:
     actuator = actuator_of(rig)
     if math.isinf(actuator.dynamics.dc_gain):  # it integrates: it rests at any output, without pressure
         return Equilibrium(0.0, 0.0, output)
-    level = output / _static_gain(rig, "sensor") - actuator.offset
+    level = (output - rig.zero) / _static_gain(rig, "sensor") - actuator.offset
     pressure = _pressure_for(rig, level / _static_gain(rig, "actuator"), output, ranges)
     command = pressure / _static_gain(rig, "regulator")
     slack = 1e-9 * (present(ranges.command)[1] - present(ranges.command)[0])

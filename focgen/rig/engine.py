@@ -145,7 +145,10 @@ class Chain:
         steps += [_effect(p) for p in here if p.slot in late]
         if stage == "actuator" and (offset := self._offset):
             steps.append((("offset", offset), lambda x, run: x + offset, None))
-        return steps + [_effect(p) for p in here if p.slot == "place"]
+        steps += [_effect(p) for p in here if p.slot == "place"]
+        if stage == "sensor" and (zero := self.rig.zero):
+            steps.append((("offset", zero), lambda x, run: x + zero, None))
+        return steps
 
     def _core(self, stage: str, here: Sequence[Placed], between: Between | bool) -> list[Step]:
         delay = getattr(self.rig.delays, stage)

@@ -48,6 +48,7 @@ def read_rig(path: str | Path | Mapping[str, Any]) -> Rig:
     sample_time = top.number("sample_time", above=0.0)
     stages = {stage: top.table(stage) for stage in _STAGES}
     delays = Delays(**{stage: _delay(table, sample_time) for stage, table in stages.items()})
+    zero = 0.0 if stages["sensor"] is None else stages["sensor"].number("offset", 0.0)
     rig = Rig(
         name=top.text("name", usual),
         sample_time=sample_time,
@@ -55,6 +56,7 @@ def read_rig(path: str | Path | Mapping[str, Any]) -> Rig:
         actuator=_actuator(stages["actuator"]),
         regulator=_stage(stages["regulator"]),
         sensor=_stage(stages["sensor"]),
+        zero=zero,
         ranges=_ranges(top.table("ranges")),
         effects=_effects(top),
         delays=delays,
@@ -153,15 +155,16 @@ def _delay(table: Table | None, sample_time: float) -> float:
     return delay
 
 
-def _delays_only(table: Table) -> bool:
-    """Whether the stage is a pure delay: it has one, and no dynamics."""
-    return "delay" in table and not any(key in table for key in ("num", "den", "T", "alpha", "gain"))
+def _is_static(table: Table) -> bool:
+    """Whether the stage has no dynamics: it is a pure delay, or an offset."""
+    given = "delay" in table or "offset" in table
+    return given and not any(key in table for key in ("num", "den", "T", "alpha", "gain"))
 
 
 def _stage(table: Table | None) -> TransferFunction:
     if table is None:
         return UNITY
-    transfer = UNITY if _delays_only(table) else _proper(table)
+    transfer = UNITY if _is_static(table) else _proper(table)
     table.done()
     return transfer
 
@@ -170,8 +173,8 @@ def _actuator(table: Table | None) -> Actuator | LinearActuator | None:
     if table is None:
         return None
     offset = table.number("offset", 0.0)
-    if "num" in table or _delays_only(table):
-        transfer = UNITY if _delays_only(table) else _proper(table)
+    if "num" in table or _is_static(table):
+        transfer = UNITY if _is_static(table) else _proper(table)
         linear = LinearActuator(transfer, offset, table.number("bias", 0.0))
         table.done()
         return linear
@@ -289,6 +292,8 @@ def rig_table(rig: Rig) -> dict[str, Any]:
     for key, delay in vars(rig.delays).items():
         if delay:
             table.setdefault(key, {})["delay"] = delay
+    if rig.zero:
+        table.setdefault("sensor", {})["offset"] = rig.zero
     table |= _bounds_table(rig)
     if rig.effects:
         table["effects"] = [dict(effect) for effect in rig.effects]

@@ -167,7 +167,8 @@ class Ranges:
 @dataclass(frozen=True)
 class Rig:
     """The nominal rig. ``sample_time`` in s; ``effects`` are the ``[[effects]]`` tables as read; ``between``:
-    what its first input does from one sample to the next, None where logs are to tell. ``known``: effects
+    what its first input does from one sample to the next, None where logs are to tell. ``zero``: what is
+    added to the sensor's reading, in the output's unit. ``known``: effects
     (:class:`focgen.rig.placed.Placed`) that are run wherever the rig is, as its numbers are; of no file."""
 
     name: str
@@ -181,6 +182,7 @@ class Rig:
     delays: Delays = Delays()
     uncertainty: Uncertainty = Uncertainty()
     between: Between | None = None
+    zero: float = 0.0
     known: tuple[Any, ...] = field(default=(), repr=False)
 
     @property

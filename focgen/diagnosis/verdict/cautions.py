@@ -111,11 +111,11 @@ def zeros_off(rig: Rig, explanations: Iterable[Explanation]) -> Iterator[str]:
         if zero := e.zero:
             entry, exit = e.segment.entry, e.segment.exit
             unit = rig.signals.unit_of(exit) or f"of {getattr(rig.signals, exit)}"
-            kept, more = exit == "output" and rig.actuator is not None, "more" if zero > 0 else "less"
+            kept, more = exit == "output", "more" if zero > 0 else "less"
             yield (
                 f"{_within(e)}: the {exit} reads {abs(zero):.3g} {unit} {more} than the {entry} tells, "
                 "at every level; the zero of one of them is off"
-                + (", and refitted.toml has it in the actuator's offset" if kept else "")
+                + (", and refitted.toml has it in the sensor's offset" if kept else "")
             )
 
 

@@ -71,8 +71,8 @@ def _after(
 def compose(rig: Rig, explanations: Sequence[Explanation], logs: Sequence[Experiment]) -> Rigs:
     """Own parameters and effects from all segments. Each was fitted by itself: where the output of the whole
     chain comes no closer by it, as where what one stage's refit makes up for is mended in another, segments
-    keep what was given; those with effects keep what was fitted beside them. The zero of a sensor's reading
-    is put into the actuator's offset."""
+    keep what was given; those with effects keep what was fitted beside them. So does the zero of the reading.
+    """
     placed = tuple(p for e in explanations for p in e.best.problem.placed(e.best.vector))
     beside = [e.best for e in explanations if e.best.problem.candidates]
     alone = [e.best for e in explanations if not e.best.problem.candidates]
@@ -85,14 +85,11 @@ def compose(rig: Rig, explanations: Sequence[Explanation], logs: Sequence[Experi
 
 
 def _with_zero(rig: Rig, last: Fit, placed: Sequence[Placed], logs: Sequence[Experiment]) -> Rig:
-    """The rig with the zero that the last segment's readings have in the actuator's offset, where that brings
-    the output closer: a sensor has none in its file, and no log tells whether its zero is off or that of the
-    gauge ahead of it."""
-    zero, actuator = last.problem.zero(last.vector), rig.actuator
-    if actuator is None or abs(zero) < _SHOWN * last.problem.segment.level_out:
+    """The rig with the zero that the last segment's readings have, where that brings the output closer."""
+    zero = last.problem.zero(last.vector)
+    if abs(zero) < _SHOWN * last.problem.segment.level_out:
         return rig
-    ahead = zero / rig.sensor.dc_gain
-    found = replace(rig, actuator=replace(actuator, offset=actuator.offset + ahead))
+    found = replace(rig, zero=rig.zero + zero)
     return found if _gap(found, placed, logs) < _gap(rig, placed, logs) else rig
 
 
