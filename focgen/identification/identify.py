@@ -93,9 +93,7 @@ def identify(
     check_bounded(replace(nominal, actuator=None), longest(experiments))
     found = {stage: identify_stage(experiments, stage) for stage in stages if stage != "actuator"}
     ranges, told = seen_ranges(nominal.ranges, experiments)
-    seen = "actuator" not in stages or all("curvature" in log for log in experiments)
-    zero = nominal.zero if seen else 0.0  # in the actuator's offset, where that is fitted to the output
-    new = _with_stages(replace(nominal, ranges=ranges, effects=(), zero=zero), found)
+    new = _with_stages(replace(nominal, ranges=ranges, effects=()), found)
     if "actuator" in stages:
         result = _actuator(experiments, others, new, gain_degree, delay, integer)
     else:

@@ -35,7 +35,7 @@ CONSTANTS = {
     "problem/excitation.py": ["_STEADY"],
     "problem/factors.py": ["LEAST", "WITHIN"],
     "problem/free.py": ["_SLACK", "_USUAL"],
-    "problem/problem.py": ["_BASELINE", "_FAR_OFF", "_OFF", "_QUICKEST", "_STANDS", "_ZERO"],
+    "problem/problem.py": ["_BASELINE", "_FAR_OFF", "_OFF", "_QUICKEST", "_STANDS"],
     "problem/segments.py": ["_EITHER", "_FOLLOWED", "_TIMING"],
     "problem/smooth.py": ["_SLOW"],
     "proposals/candidate_rigs.py": ["_STEP"],

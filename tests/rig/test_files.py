@@ -13,6 +13,7 @@ from focgen.errors import RigError
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig import LinearActuator, read_rig, write_rig
 from focgen.rig.files import check_replaces_rig
+from focgen.rig.rig import UNITY
 from focgen.verification.folder import read_folder
 from tests.conftest import paper_controller
 
@@ -66,7 +67,13 @@ def test_a_mark_that_an_editor_puts_ahead_is_no_part_of_it(tmp_path):
 def test_written_rig_reads_back_equal(tmp_path, paper_rig):
     linear = LinearActuator(TransferFunction([(2, 0)], [(0.3, 1.2), (1, 0)]), offset=0.5)
     effects = ({"name": "leak", "stage": "regulator", "strength": 0.1},)
-    for rig in (paper_rig, replace(paper_rig, actuator=linear, effects=effects)):
+    zeroed = replace(paper_rig, zero=-0.25)
+    for rig in (
+        paper_rig,
+        zeroed,
+        replace(zeroed, sensor=UNITY),
+        replace(paper_rig, actuator=linear, effects=effects),
+    ):
         write_rig(rig, tmp_path / "rig.toml")
         assert read_rig(tmp_path / "rig.toml") == rig
 
