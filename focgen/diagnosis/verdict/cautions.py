@@ -105,15 +105,16 @@ def _instead(e: Explanation) -> Iterator[str]:
             yield f"{_within(e)}: {other.said}"
 
 
-def zeros_off(rig: Rig, explanations: Iterable[Explanation]) -> Iterator[str]:
-    """Where the zero of a signal is off against the one ahead of it."""
+def zeros_off(rig: Rig, refitted: Rig, explanations: Iterable[Explanation]) -> Iterator[str]:
+    """Where the zero of a signal is off against the one ahead of it, and whether it is in ``refitted``."""
     for e in explanations:
         if zero := e.zero:
             entry, exit = e.segment.entry, e.segment.exit
-            unit = rig.signals.unit_of(exit) or f"of {getattr(rig.signals, exit)}"
-            kept, more = exit == "output", "more" if zero > 0 else "less"
+            by = f"{abs(zero):.3g} {rig.signals.unit_of(exit) or ''}".rstrip()
+            by += " more" if zero > 0.0 else " less"
+            kept = exit == "output" and refitted.zero != rig.zero
             yield (
-                f"{_within(e)}: the {exit} reads {abs(zero):.3g} {unit} {more} than the {entry} tells, "
+                f"{_within(e)}: the {exit} reads {by} than the {entry} tells, "
                 "at every level; the zero of one of them is off"
                 + (", and refitted.toml has it in the sensor's offset" if kept else "")
             )

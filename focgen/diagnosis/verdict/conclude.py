@@ -94,7 +94,7 @@ def conclude(
             *lesser(stands.beside),
             *the_rest(summary),
             *ended(summary.causes),
-            *zeros_off(rig, explanations),
+            *zeros_off(rig, summary.rigs.refitted, explanations),
             *paced(explanations),
             *rounded(explanations),
             *gauges(stands.at_odds),
