@@ -81,7 +81,7 @@ class Chain:
                 x, run = self._once("stood", run.stands, x, from_there, run), run.stood
                 before = behind = run
             if stage == "actuator" and self._offset:
-                before, behind, run = (r.lying(x, self._offset) for r in (before, behind, run))
+                behind, run = (r.lying(x, self._offset) for r in (behind, run))
             tapped[stage] = x
             if between != Between.STRAIGHT and not self._passes(stage):
                 between = Between.STRAIGHT

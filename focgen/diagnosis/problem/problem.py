@@ -344,10 +344,8 @@ class Problem:
         return np.repeat(zeros * _BASELINE * self.segment.level_out, lengths)
 
     def level(self, vector: np.ndarray) -> np.ndarray:
-        """``vector`` with the zeros of all experiments alike, and where no offset is of the rig at none."""
+        """``vector`` with the zeros of all experiments alike."""
         alike = vector.copy()
-        if not self.nominals.has_offset:
-            alike[len(self.nominal_start) + 1] = 0.0
         alike[self.head - self.zeros - self.stood : self.head - self.stood] = 0.0
         return alike
 

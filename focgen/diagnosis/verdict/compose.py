@@ -77,20 +77,33 @@ def compose(rig: Rig, explanations: Sequence[Explanation], logs: Sequence[Experi
     beside = [e.best for e in explanations if e.best.problem.candidates]
     alone = [e.best for e in explanations if not e.best.problem.candidates]
     refitted = _closest(rig, [e.nominal for e in explanations], (), logs)
-    refitted = _with_zero(refitted, explanations[-1].nominal, (), logs)
+    refitted = _with_zeros(refitted, [e.nominal for e in explanations], (), logs)
     if not placed:
         return Rigs(refitted, refitted, placed)
     fitted = _closest(_moved(rig, beside), alone, placed, logs)
-    return Rigs(refitted, _with_zero(fitted, explanations[-1].best, placed, logs), placed)
+    return Rigs(refitted, _with_zeros(fitted, [e.best for e in explanations], placed, logs), placed)
 
 
-def _with_zero(rig: Rig, last: Fit, placed: Sequence[Placed], logs: Sequence[Experiment]) -> Rig:
-    """The rig with the zero that the last segment's readings have, where that brings the output closer."""
-    zero = last.problem.zero(last.vector)
-    if abs(zero) < _SHOWN * last.problem.segment.level_out:
+def _with_zeros(rig: Rig, fits: Sequence[Fit], placed: Sequence[Placed], logs: Sequence[Experiment]) -> Rig:
+    """The rig with the zeros of readings in it, where that brings the output closer: the output's as the
+    sensor's; and what a pressure's, which the actuator was fitted to, would make of the output, in the
+    actuator's offset."""
+    for of in fits:
+        segment, zero = of.problem.segment, of.problem.zero(of.vector)
+        if abs(zero) < _SHOWN * segment.level_out:
+            continue
+        found = replace(rig, zero=rig.zero + zero) if segment.exit == "output" else _driven(rig, zero)
+        rig = found if _gap(found, placed, logs) < _gap(rig, placed, logs) else rig
+    return rig
+
+
+def _driven(rig: Rig, pressure: float) -> Rig:
+    """The rig with what a ``pressure`` makes in the actuator's offset."""
+    actuator = rig.actuator
+    if actuator is None or not np.isfinite(actuator.dynamics.dc_gain):
         return rig
-    found = replace(rig, zero=rig.zero + zero)
-    return found if _gap(found, placed, logs) < _gap(rig, placed, logs) else rig
+    made = float(actuator.drive(pressure) - actuator.drive(0.0)) * actuator.dynamics.dc_gain
+    return replace(rig, actuator=replace(actuator, offset=actuator.offset + made))
 
 
 def _closest(rig: Rig, fits: Sequence[Fit], placed: Sequence[Placed], logs: Sequence[Experiment]) -> Rig:
