@@ -26,7 +26,7 @@ CONSTANTS = {
     "hypotheses/initial.py": ["_EXACT", "_HELD", "_LEVEL", "_REST", "_SEEN", "_SHOWN", "_SURE"],
     "hypotheses/left.py": ["_ERRORS", "_OFF", "_STILL"],
     "hypotheses/level_pace.py": ["_PART"],
-    "hypotheses/nuisances.py": ["_GAUGE", "_OUT_OF_STEP", "_SMOOTHER"],
+    "hypotheses/nuisances.py": ["_GAUGE", "_OUT_OF_STEP", "_SMOOTHER", "_ZERO"],
     "hypotheses/roughly.py": ["_NEAR"],
     "hypotheses/search.py": ["_ADRIFT", "_BENT", "_FAR", "_NEAR", "_QUICK"],
     "hypotheses/seen_through.py": ["_AS_WELL", "_FINELY"],

@@ -28,6 +28,7 @@ from focgen.rig.rig import Rig
 
 # of the rig's response, and a sample at most: what columns may be out of step by; more is a delay
 _OUT_OF_STEP = 0.05
+_ZERO = 0.03  # of the level: by what a zero beside an effect may be another
 _GAUGE = 0.01  # of its reading: by what a gauge may be off without being a fault
 _WAYS = (Between.HELD, Between.STRAIGHT, Between.SMOOTH)  # of a command between its samples
 _SMOOTHER = 0.95  # of the mean square that lines leave: a smooth curve, which takes longer, has to leave less
@@ -36,7 +37,7 @@ _RESTS = 0.5  # of a command's samples at which it rests: then it is no smooth c
 
 def uncertain(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
     """The segment's problem without effects, with all that explains a log without one let go."""
-    return _widened(_gauged(_zeroed(_paced(_held(rig, segment, logs)))))
+    return _widened(_gauged(_zeroed(_paced(_about_zero(_held(rig, segment, logs))))))
 
 
 def problem_of(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
@@ -65,6 +66,15 @@ def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
     if tried[-1] == Between.SMOOTH and last.sse > _SMOOTHER * closest.sse:
         return closest.problem
     return min(closest, last, key=lambda f: f.sse).problem
+
+
+def _about_zero(problem: Problem) -> Problem:
+    """The problem with the zero of its readings free, but beside effects no further than it is without any,
+    and a little: a curve behind a zero of its own would be any transient."""
+    if problem.nominals.has_offset:
+        return problem
+    zero = _ground(problem, problem.nominal()).vector[len(problem.nominal_start) + 1]
+    return replace(problem, zero_within=(min(zero, 0.0) - _ZERO, max(zero, 0.0) + _ZERO))
 
 
 def ways(segment: Segment) -> list[Between]:

@@ -19,7 +19,6 @@ from focgen.rig.engine import Chain
 from focgen.rig.placed import Placed, slot_in
 from focgen.rig.rig import Rig
 
-_ZERO = 1.0  # of the level: as far as a zero is looked for, which no effect of the library is
 _ALIGNED = 0.5  # of the slack of columns: what a standard deviation is; a delay is to be called one
 _OFF = 3.0  # standard deviations that an input may be off in each way
 _FAR_OFF = 20.0  # the same of a zero that no effect moves
@@ -84,7 +83,8 @@ class Problem:
     standard deviations; how far the begins of experiments are, likewise; where readings are ``uneven``, the
     zero of each experiment's, likewise; where what a pump held is told through an actuator, how far each
     experiment's is off, likewise), then every candidate effect's parameters, all of order one.
-    ``weight``: of what is known of nominal parameters beforehand, against the data.
+    ``weight``: of what is known of nominal parameters beforehand, against the data. ``zero_within``: the ends
+    of the zero of the segment's readings, of the level.
     """
 
     segment: Segment
@@ -96,10 +96,11 @@ class Problem:
     gauge: float = 0.0
     uneven: bool = False
     weight: float = 1.0
+    zero_within: tuple[float, float] = (-1.0, 1.0)
 
     def __post_init__(self) -> None:
         self.nominal_start = self.nominals.start()
-        zero = [] if self.nominals.has_offset else [_ZERO]
+        zero = [] if self.nominals.has_offset else [1.0]
         self.gauges = [*zero, self.gauge] if self.gauge else zero
         self.nuisances = 1 + len(self.gauges) + self.ways + self.zeros + self.stood
 
@@ -208,6 +209,9 @@ class Problem:
                 least = self._least(p) if p.log else p.lower
                 low.append(np.log(least) if p.log else least)
                 high.append(np.log(max(p.upper, least)) if p.log else p.upper)
+        if not self.nominals.has_offset:
+            place = len(self.nominal_start) + 1
+            low[place], high[place] = self.zero_within
         return np.array(low, float), np.array(high, float)
 
     @property
@@ -344,8 +348,10 @@ class Problem:
         return np.repeat(zeros * _BASELINE * self.segment.level_out, lengths)
 
     def level(self, vector: np.ndarray) -> np.ndarray:
-        """``vector`` with the zeros of all experiments alike."""
+        """``vector`` with the zeros of all experiments alike, and where no offset is of the rig at none."""
         alike = vector.copy()
+        if not self.nominals.has_offset:
+            alike[len(self.nominal_start) + 1] = 0.0
         alike[self.head - self.zeros - self.stood : self.head - self.stood] = 0.0
         return alike
 

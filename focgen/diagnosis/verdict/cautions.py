@@ -112,11 +112,13 @@ def zeros_off(rig: Rig, refitted: Rig, explanations: Iterable[Explanation]) -> I
             entry, exit = e.segment.entry, e.segment.exit
             by = f"{abs(zero):.3g} {rig.signals.unit_of(exit) or ''}".rstrip()
             by += " more" if zero > 0.0 else " less"
-            kept = exit == "output" and refitted.zero != rig.zero
+            mended = f"; if it is this gauge's, an offset of {-zero:.3g} in [signals] mends it"
+            if exit == "output":
+                kept = refitted.zero != rig.zero
+                mended = ", and refitted.toml has it in the sensor's offset" if kept else ""
             yield (
                 f"{_within(e)}: the {exit} reads {by} than the {entry} tells, "
-                "at every level; the zero of one of them is off"
-                + (", and refitted.toml has it in the sensor's offset" if kept else "")
+                f"at every level; the zero of one of them is off{mended}"
             )
 
 

@@ -76,45 +76,38 @@ def compose(rig: Rig, explanations: Sequence[Explanation], logs: Sequence[Experi
     placed = tuple(p for e in explanations for p in e.best.problem.placed(e.best.vector))
     beside = [e.best for e in explanations if e.best.problem.candidates]
     alone = [e.best for e in explanations if not e.best.problem.candidates]
-    refitted = _closest(rig, [e.nominal for e in explanations], (), logs)
-    refitted = _with_zeros(refitted, [e.nominal for e in explanations], (), logs)
+    nominal, last = [e.nominal for e in explanations], explanations[-1]
+    refitted = _closest(rig, nominal, last.nominal, (), logs)
     if not placed:
         return Rigs(refitted, refitted, placed)
-    fitted = _closest(_moved(rig, beside), alone, placed, logs)
-    return Rigs(refitted, _with_zeros(fitted, [e.best for e in explanations], placed, logs), placed)
+    fitted = _closest(_moved(rig, beside), alone, last.best, placed, logs)
+    return Rigs(refitted, fitted, placed)
 
 
-def _with_zeros(rig: Rig, fits: Sequence[Fit], placed: Sequence[Placed], logs: Sequence[Experiment]) -> Rig:
-    """The rig with the zeros of readings in it, where that brings the output closer: the output's as the
-    sensor's; and what a pressure's, which the actuator was fitted to, would make of the output, in the
-    actuator's offset."""
-    for of in fits:
-        segment, zero = of.problem.segment, of.problem.zero(of.vector)
-        if abs(zero) < _SHOWN * segment.level_out:
-            continue
-        found = replace(rig, zero=rig.zero + zero) if segment.exit == "output" else _driven(rig, zero)
-        rig = found if _gap(found, placed, logs) < _gap(rig, placed, logs) else rig
-    return rig
-
-
-def _driven(rig: Rig, pressure: float) -> Rig:
-    """The rig with what a ``pressure`` makes in the actuator's offset."""
-    actuator = rig.actuator
-    if actuator is None or not np.isfinite(actuator.dynamics.dc_gain):
+def _with_zero(rig: Rig, last: Fit, placed: Sequence[Placed], logs: Sequence[Experiment]) -> Rig:
+    """The rig with the zero that the output's readings have, where that brings the output closer."""
+    zero = last.problem.zero(last.vector)
+    if abs(zero) < _SHOWN * last.problem.segment.level_out:
         return rig
-    made = float(actuator.drive(pressure) - actuator.drive(0.0)) * actuator.dynamics.dc_gain
-    return replace(rig, actuator=replace(actuator, offset=actuator.offset + made))
+    found = replace(rig, zero=rig.zero + zero)
+    return found if _gap(found, placed, logs) < _gap(rig, placed, logs) else rig
 
 
-def _closest(rig: Rig, fits: Sequence[Fit], placed: Sequence[Placed], logs: Sequence[Experiment]) -> Rig:
+def _closest(
+    rig: Rig, fits: Sequence[Fit], last: Fit, placed: Sequence[Placed], logs: Sequence[Experiment]
+) -> Rig:
     """The rig with the nominal parameters of all ``fits`` where that brings the output closer, else of those
-    that bring it closest.
+    that bring it closest; each with the zero that the ``last`` segment's readings have.
     """
     fits = [f for f in fits if len(f.problem.nominal_start)]
-    every = _moved(rig, fits)
-    if not fits or _gap(every, placed, logs) <= _gap(rig, placed, logs):
-        return every
-    some = [_moved(rig, part) for n in range(len(fits)) for part in combinations(fits, n)]
+
+    def moved(part: Sequence[Fit]) -> Rig:
+        return _with_zero(_moved(rig, part), last, placed, logs)
+
+    all_moved = moved(fits)
+    if not fits or _gap(all_moved, placed, logs) <= _gap(rig, placed, logs):
+        return all_moved
+    some = [moved(part) for n in range(len(fits)) for part in combinations(fits, n)]
     return min(some, key=lambda r: _gap(r, placed, logs))
 
 
