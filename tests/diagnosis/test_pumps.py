@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from focgen.diagnosis.diagnose import diagnose
-from focgen.diagnosis.problem.problem import may_have_held
+from focgen.diagnosis.problem.held import may_have_held
 from focgen.logs.begin import REST, Begin
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import Run

@@ -16,7 +16,7 @@ import numpy as np
 
 from focgen.diagnosis.fitting.fit import WHITE, Fit, fit
 from focgen.diagnosis.hypotheses.nuisances import problem_of
-from focgen.diagnosis.problem.problem import may_have_held, tells_what_is_held
+from focgen.diagnosis.problem.held import may_have_held, tells_what_is_held
 from focgen.diagnosis.problem.segments import Segment, cuts, make
 from focgen.logs.begin import REST, Begin
 from focgen.logs.experiment import Experiment

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from focgen.diagnosis.problem.excitation import excitation
+from focgen.diagnosis.problem.held import may_have_held, tells_what_is_held
 from focgen.diagnosis.problem.nominal_parameters import NominalParameters
 from focgen.diagnosis.problem.segments import Segment
-from focgen.logs.begin import REST
 from focgen.rig.effects import Effect, Excitation, Form, Parameter, Run, library
 from focgen.rig.engine import Chain
 from focgen.rig.placed import Placed, slot_in
@@ -25,17 +25,6 @@ _FAR_OFF = 20.0  # the same of a zero that no effect moves
 _QUICKEST = 4.0  # means of samples in a response at least
 _STANDS = 0.1  # of the level: what a volume is off by that is told through an actuator
 _BASELINE = 0.005  # of the level: what the zero of a reading differs by from one experiment to the next
-
-
-def tells_what_is_held(rig: Rig, stages: Sequence[str]) -> bool:
-    """Whether what a pump holds is told through a stage behind it."""
-    return rig.integrator == "regulator" and stages[0] == "regulator" and len(stages) > 1
-
-
-def may_have_held(run: Run) -> tuple[bool, ...]:
-    """By experiment: whether what a pump held as it began may be off; not where it began empty, at rest."""
-    stands, begins = run.stands or (0.0,) * len(run.spans), run.begins or (REST,) * len(run.spans)
-    return tuple(stood != 0.0 or not begin.at_rest for stood, begin in zip(stands, begins))
 
 
 @dataclass(frozen=True)
