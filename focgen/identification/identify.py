@@ -93,7 +93,8 @@ def identify(
     check_bounded(replace(nominal, actuator=None), longest(experiments))
     found = {stage: identify_stage(experiments, stage) for stage in stages if stage != "actuator"}
     ranges, told = seen_ranges(nominal.ranges, experiments)
-    new = _with_stages(replace(nominal, ranges=ranges, effects=()), found)
+    zero = 0.0 if "actuator" in stages else nominal.zero  # offsets are each experiment's own
+    new = _with_stages(replace(nominal, ranges=ranges, effects=(), zero=zero), found)
     if "actuator" in stages:
         result = _actuator(experiments, others, new, gain_degree, delay, integer)
     else:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from focgen.arrays import Array
-from focgen.control.equilibrium import Equilibrium
+from focgen.control.equilibrium import Equilibrium, actuator_of
 from focgen.fractional.transfer import TransferFunction
 from focgen.loop.chain import substeps
 from focgen.loop.run import LoopRun
@@ -55,7 +55,8 @@ class Plant:
         are unknown.
         """
         parts = max(_LEAST_PARTS, substeps(rig, sample_time))
-        lead = samples if start.command or start.output else 0
+        driven = start.command or actuator_of(rig).drive(start.pressure)  # at its offsets it is at rest
+        lead = samples if driven else 0
         return cls(rig, placed_in(rig), sample_time, parts, session_end(rig), lead)
 
     def signals(self, command: Array, idle: float) -> dict[str, Array]:

@@ -81,7 +81,8 @@ class Chain:
                 x, run = self._once("stood", run.stands, x, from_there, run), run.stood
                 before = behind = run
             if stage == "actuator" and self._offset:
-                behind, run = (r.lying(x, self._offset) for r in (behind, run))
+                lying = behind.lying(x, self._offset)
+                behind, run = lying, lying if run is behind else run.lying(x, self._offset)
             tapped[stage] = x
             if between != Between.STRAIGHT and not self._passes(stage):
                 between = Between.STRAIGHT

@@ -55,7 +55,7 @@ def read_rig(path: str | Path | Mapping[str, Any]) -> Rig:
         signals=_signals(top),
         actuator=_actuator(stages["actuator"]),
         regulator=_stage(stages["regulator"]),
-        sensor=_stage(stages["sensor"]),
+        sensor=_stage(stages["sensor"], "offset"),
         zero=zero,
         ranges=_ranges(top.table("ranges")),
         effects=_effects(top),
@@ -155,16 +155,16 @@ def _delay(table: Table | None, sample_time: float) -> float:
     return delay
 
 
-def _is_static(table: Table) -> bool:
-    """Whether the stage has no dynamics: it is a pure delay, or an offset."""
-    given = "delay" in table or "offset" in table
+def _is_static(table: Table, *alone: str) -> bool:
+    """Whether the stage has no dynamics: it is a pure delay, or what else may stand ``alone``."""
+    given = any(key in table for key in ("delay", *alone))
     return given and not any(key in table for key in ("num", "den", "T", "alpha", "gain"))
 
 
-def _stage(table: Table | None) -> TransferFunction:
+def _stage(table: Table | None, *alone: str) -> TransferFunction:
     if table is None:
         return UNITY
-    transfer = UNITY if _is_static(table) else _proper(table)
+    transfer = UNITY if _is_static(table, *alone) else _proper(table)
     table.done()
     return transfer
 

@@ -19,7 +19,7 @@ from focgen.diagnosis.hypotheses.disturbance import disturbance
 from focgen.diagnosis.hypotheses.level_pace import level_pace
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.nominal_parameters import NominalParameters
-from focgen.diagnosis.problem.problem import Problem
+from focgen.diagnosis.problem.problem import ZERO, Problem
 from focgen.diagnosis.problem.scales import references
 from focgen.diagnosis.problem.segments import Segment, owner
 from focgen.logs.between import Between
@@ -28,7 +28,6 @@ from focgen.rig.rig import Rig
 
 # of the rig's response, and a sample at most: what columns may be out of step by; more is a delay
 _OUT_OF_STEP = 0.05
-_ZERO = 0.03  # of the level: by what a zero beside an effect may be another
 _GAUGE = 0.01  # of its reading: by what a gauge may be off without being a fault
 _WAYS = (Between.HELD, Between.STRAIGHT, Between.SMOOTH)  # of a command between its samples
 _SMOOTHER = 0.95  # of the mean square that lines leave: a smooth curve, which takes longer, has to leave less
@@ -70,11 +69,13 @@ def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
 
 def _about_zero(problem: Problem) -> Problem:
     """The problem with the zero of its readings free, but beside effects no further than it is without any,
-    and a little: a curve behind a zero of its own would be any transient."""
-    if problem.nominals.has_offset:
+    and a little: a curve behind a zero of its own would be any transient. What adds up stood somewhere, which
+    no zero tells it from."""
+    if problem.nominals.has_offset or problem.segment.pace:
         return problem
-    zero = _ground(problem, problem.nominal()).vector[len(problem.nominal_start) + 1]
-    return replace(problem, zero_within=(min(zero, 0.0) - _ZERO, max(zero, 0.0) + _ZERO))
+    free = replace(problem, zero_within=(-1.0, 1.0))
+    zero = _ground(free, free.nominal()).vector[len(problem.nominal_start) + 1]
+    return replace(problem, zero_within=(min(zero, 0.0) - ZERO, max(zero, 0.0) + ZERO))
 
 
 def ways(segment: Segment) -> list[Between]:

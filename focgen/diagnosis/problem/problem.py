@@ -19,6 +19,7 @@ from focgen.rig.engine import Chain
 from focgen.rig.placed import Placed, slot_in
 from focgen.rig.rig import Rig
 
+ZERO = 0.03  # of the level: what a zero is off by that nothing shows alone
 _ALIGNED = 0.5  # of the slack of columns: what a standard deviation is; a delay is to be called one
 _OFF = 3.0  # standard deviations that an input may be off in each way
 _FAR_OFF = 20.0  # the same of a zero that no effect moves
@@ -85,11 +86,11 @@ class Problem:
     gauge: float = 0.0
     uneven: bool = False
     weight: float = 1.0
-    zero_within: tuple[float, float] = (-1.0, 1.0)
+    zero_within: tuple[float, float] = (-ZERO, ZERO)
 
     def __post_init__(self) -> None:
         self.nominal_start = self.nominals.start()
-        zero = [] if self.nominals.has_offset else [1.0]
+        zero = [] if self.nominals.has_offset else [ZERO]
         self.gauges = [*zero, self.gauge] if self.gauge else zero
         self.nuisances = 1 + len(self.gauges) + self.ways + self.zeros + self.stood
 
