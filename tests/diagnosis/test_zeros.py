@@ -12,7 +12,10 @@ import numpy as np
 import pytest
 
 from focgen.diagnosis.diagnose import diagnose
+from focgen.fractional.transfer import TransferFunction
+from focgen.logs.experiment import Experiment
 from focgen.rig.replay import replay
+from focgen.rig.rig import Rig, Signals
 from tests.diagnosis_rig import RIG, session
 
 DRIFTS = ("sensor_drift", "gain_drift")
@@ -71,3 +74,14 @@ def test_an_effect_beside_a_zero_is_named_and_both_are_in_the_rig():
 def test_a_rig_as_given_has_no_zero_off():
     found = diagnose(RIG, session(3), pictures=False)
     assert found.verdict in ("none", "parameters") and not any(" reads " in line for line in found.notes)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_a_pump_held_is_no_zero(seed):
+    """Both shift its path alike. As free as elsewhere, the zero took it in two of four."""
+    rig = Rig("pump", 0.05, Signals("t", "y", "u"), regulator=TransferFunction([(0.2, 0.0)], [(1.0, 1.0)]))
+    u = np.repeat([0.0, 1.0, 0.0, -0.5, 0.0, 0.7, 0.0], 100)
+    y = 1.0 + 0.2 * 0.05 * np.r_[0.0, np.cumsum(u)[:-1]]
+    y += 0.01 * np.random.default_rng(seed).normal(size=len(u))
+    found = diagnose(rig, [Experiment("log", 0.05, {"command": u, "output": y}, 0.0)], pictures=False)
+    assert not found.causes and abs(found.refitted.zero) < 0.1
