@@ -111,10 +111,7 @@ class Run:
         later = self._later_from_rest
         if self.stands or not len(later):
             return self
-        still = _STILL * max(float(x.max(initial=0.0)), -float(x.min(initial=0.0)))
-        rest = self.rest.copy()
-        rest[later[np.abs(x[later]) <= still]] = 2
-        return replace(self, rest=rest)
+        return self._in_equilibrium(x, later, 0.0)
 
     @cached_property
     def _later_from_rest(self) -> Array:
@@ -134,8 +131,11 @@ class Run:
     def lying(self, x: Array, level: float) -> Run:
         """The run behind what rests at a ``level`` of its own: an experiment in which its output ``x`` (n,)
         comes from rest and begins there begins in equilibrium with it."""
-        firsts, rest = np.flatnonzero(self.rest == 1), self.rest.copy()
-        still = _STILL * max(float(x.max(initial=0.0)), -float(x.min(initial=0.0)))
+        return self._in_equilibrium(x, np.flatnonzero(self.rest == 1), level)
+
+    def _in_equilibrium(self, x: Array, firsts: np.ndarray, level: float) -> Run:
+        """The run in equilibrium wherever a signal ``x`` (n,) is at a ``level`` at one of ``firsts``."""
+        rest, still = self.rest.copy(), _STILL * max(float(x.max(initial=0.0)), -float(x.min(initial=0.0)))
         rest[firsts[np.abs(x[firsts] - level) <= still]] = 2
         return replace(self, rest=rest)
 
