@@ -357,5 +357,5 @@ def explain_all(
             rest = slow_rest(segment, x, response)
             ways = np.column_stack([input_covariance(e), rest])
         unsure = strays(segment, made, response, left, noise)
-        x = x + problem.simulate(problem.level(e.best.vector)) - made
+        x = x + problem.simulate(problem.level(e.best.vector, is_explained(left, noise))) - made
     return tuple(found)

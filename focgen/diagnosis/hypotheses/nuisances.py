@@ -68,13 +68,16 @@ def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
 
 
 def _about_zero(problem: Problem) -> Problem:
-    """The problem with the zero of its readings free, but beside effects no further than it is without any,
-    and a little: a curve behind a zero of its own would be any transient. What adds up stood somewhere, which
-    no zero tells it from."""
+    """The problem with the zero of its readings free where that leaves far less; beside effects no further
+    than it is without any, and a little: a curve behind a zero of its own would be any transient. What adds
+    up stood somewhere, which no zero tells it from."""
     if problem.nominals.has_offset or problem.segment.pace:
         return problem
     free = replace(problem, zero_within=(-1.0, 1.0))
-    zero = _ground(free, free.nominal()).vector[len(problem.nominal_start) + 1]
+    found, little = (_ground(p, p.nominal()) for p in (free, problem))
+    if found.sse > NUMBERS.unlikely * little.sse:
+        return problem
+    zero = found.vector[len(problem.nominal_start) + 1]
     return replace(problem, zero_within=(min(zero, 0.0) - ZERO, max(zero, 0.0) + ZERO))
 
 

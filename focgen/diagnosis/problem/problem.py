@@ -337,10 +337,11 @@ class Problem:
         lengths = [last - first for first, last in self.segment.run.spans]
         return np.repeat(zeros * _BASELINE * self.segment.level_out, lengths)
 
-    def level(self, vector: np.ndarray) -> np.ndarray:
-        """``vector`` with the zeros of all experiments alike, and where no offset is of the rig at none."""
+    def level(self, vector: np.ndarray, explained: bool = True) -> np.ndarray:
+        """``vector`` with the zeros of all experiments alike, and at none where the rig has no offset and all
+        is ``explained``: else the zero stands for part of what is not."""
         alike = vector.copy()
-        if not self.nominals.has_offset:
+        if explained and not self.nominals.has_offset:
             alike[len(self.nominal_start) + 1] = 0.0
         alike[self.head - self.zeros - self.stood : self.head - self.stood] = 0.0
         return alike
