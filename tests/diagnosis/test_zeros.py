@@ -78,10 +78,12 @@ def test_a_rig_as_given_has_no_zero_off():
 
 @pytest.mark.parametrize("seed", range(4))
 def test_what_a_pump_held_is_no_zero(seed):
-    """Both shift its path alike. As free as elsewhere, the zero took it in two of four."""
+    """Both shift its path alike. As free as elsewhere, the zero took it in two of four. And white noise is
+    a pump's floor: by its recent part, a seventh of it, the pump was ``unknown`` in all."""
     rig = Rig("pump", 0.05, Signals("t", "y", "u"), regulator=TransferFunction([(0.2, 0.0)], [(1.0, 1.0)]))
     u = np.repeat([0.0, 1.0, 0.0, -0.5, 0.0, 0.7, 0.0], 100)
     y = 1.0 + 0.2 * 0.05 * np.r_[0.0, np.cumsum(u)[:-1]]
     y += 0.01 * np.random.default_rng(seed).normal(size=len(u))
     found = diagnose(rig, [Experiment("log", 0.05, {"command": u, "output": y}, 0.0)], pictures=False)
-    assert not found.causes and abs(found.refitted.zero) < 0.1
+    assert found.verdict in ("none", "parameters") and abs(found.refitted.zero) < 0.1
+    assert found.gap.floor == pytest.approx(0.01, rel=0.1)

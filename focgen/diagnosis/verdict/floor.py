@@ -6,6 +6,7 @@ import numpy as np
 
 from focgen.diagnosis.fitting.fit import problem_residual
 from focgen.diagnosis.hypotheses.explain import Explanation
+from focgen.diagnosis.problem.segments import Segment
 from focgen.rig.effects import STEP, library
 
 
@@ -13,14 +14,23 @@ def floor(last: Explanation, explained: float) -> float:
     """The noise's mean square at the output, its unit squared: what is left in the ``last`` segment, less
     what inputs predict of it; at most the mean square that is left with all effects, ``explained``.
 
-    Noise is alike in all experiments: where most are explained better, the floor is theirs. A rounding in
+    Noise is alike in all experiments: where most are explained better, the floor is theirs. Where errors add
+    up, what is left is its recent part, which holds a part of the noise only. A rounding in
     steps of q turns noise of a root mean square s below q into errors of mean square q s √(2/π): that many
     readings lie a step off. The floor is the noise, not what the rounding makes of it.
     """
-    parts = [np.mean(p**2) for p in last.segment.parts(problem_residual(last.best))]
+    segment = last.segment
+    parts = [np.mean(p**2) / _kept(segment) for p in segment.parts(problem_residual(last.best))]
     found = min(float(np.mean(parts)) * (1 - last.predictability.share), float(np.median(parts)), explained)
     step = _step(last)
     return min(found, (np.sqrt(np.pi / 2) * explained / step) ** 2) if step else found
+
+
+def _kept(segment: Segment) -> float:
+    """The part of white noise's mean square that is in its recent part."""
+    impulse = np.zeros(len(segment.run.rest))
+    impulse[0] = 1.0
+    return float(np.sum(segment.recent(impulse) ** 2))
 
 
 def _step(last: Explanation) -> float | None:
