@@ -1,6 +1,4 @@
-"""The command line: one small file a command, each with HELP, EXAMPLE, add_arguments(parser) and
-run(args).
-"""
+"""The command line: one small file a command, each with EXAMPLE, add_arguments(parser) and run(args)."""
 
 import os
 

@@ -15,7 +15,6 @@ from focgen.targets.selection import entry_of
 from focgen.verification.costs import ControllerCost, cost
 from focgen.verification.remembered import COMPILERS
 
-HELP = "what one step of generated C costs on microcontrollers: instructions, cycles, flash, RAM, stack"
 EXAMPLE = """example:
   focgen cost firmware --target all
   focgen cost build/demo/firmware --target cortex-m4 --compiler gcc

@@ -12,9 +12,6 @@ from focgen.present import present
 from focgen.report.demo_page import demo_lead, diagnosis_sentence, firmware_table
 from focgen.report.page import text_table
 
-HELP = (
-    "all of it on the example logs: model, controller, verified C, and a sealed case diagnosed; with a report"
-)
 EXAMPLE = """example:
   focgen demo --out build/demo
 

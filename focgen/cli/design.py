@@ -15,7 +15,6 @@ from focgen.report.control_summary import design_payload, design_text
 from focgen.report.pages.control import design_page
 from focgen.rig.files import read_rig
 
-HELP = "invert the rig's model, find the gain schedule K_o(p)/K(p), check the margins"
 EXAMPLE = """example:
   focgen design identified.toml --out controller.toml --settling 1.5 --report pictures
 

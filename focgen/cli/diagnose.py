@@ -16,8 +16,6 @@ from focgen.report.diagnosis_summary import diagnosis_text
 from focgen.report.paths import page_of
 from focgen.rig.files import read_rig
 
-HELP = "where the gap to the real rig lies, which effect causes it, and how far it shrinks"
-
 EXAMPLE = """example:
   focgen diagnose rig.toml logs/*.csv --out diagnosis
   focgen replay diagnosis/augmented.toml new.csv

@@ -13,8 +13,6 @@ from focgen.errors import InputError
 from focgen.fractional.continuous import OPERATORS
 from focgen.plan.plan import Plan
 
-HELP = "Write C99 for a controller, with proofs and error bounds in its manifest."
-
 EXAMPLE = """example:
   focgen generate controller.toml --out firmware --arithmetic q31 --length 1000
   focgen verify firmware

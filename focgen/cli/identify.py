@@ -15,7 +15,6 @@ from focgen.report.identification_summary import identification_payload, identif
 from focgen.report.pages.identification import identification_page
 from focgen.rig.files import check_replaces_rig, rig_text
 
-HELP = "fit K(p)/(T s^alpha + 1) to logs of a rig, and integer-order models beside it"
 EXAMPLE = """example:
   focgen identify logs/steps.csv --rig rig.toml --out identified.toml --report pictures \\
     --unseen logs/sines.csv

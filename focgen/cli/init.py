@@ -12,8 +12,6 @@ from focgen.rig.proposal import init
 from focgen.rig.rig import Rig
 from focgen.terminal import for_terminal
 
-HELP = "propose a rig.toml for logs: which column is what, units, ranges, and what is unsure"
-
 EXAMPLE = """example:
   focgen init steps.csv --out rig.toml
   focgen identify steps.csv --rig rig.toml --out identified.toml

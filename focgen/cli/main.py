@@ -28,22 +28,24 @@ from focgen.errors import FocgenError
 from focgen.jsontext import to_json
 from focgen.terminal import for_terminal
 
-# The order of the help page; a command exists where focgen/cli has its file.
-_COMMANDS = (
-    "init",
-    "identify",
-    "design",
-    "simulate",
-    "generate",
-    "verify",
-    "cost",
-    "study",
-    "diagnose",
-    "replay",
-    "report",
-    "trial",
-    "demo",
-)
+# In the order of the help page, which is told without loading them: scipy takes its time. A command exists
+# where focgen/cli has its file.
+_COMMANDS = {
+    "init": "propose a rig.toml for logs: which column is what, units, ranges, and what is unsure",
+    "identify": "fit K(p)/(T s^alpha + 1) to logs of a rig, and integer-order models beside it",
+    "design": "invert the rig's model, find the gain schedule K_o(p)/K(p), check the margins",
+    "simulate": "the closed loop of rig and controller at a row of set points",
+    "generate": "write C99 for a controller, with proofs and error bounds in its manifest",
+    "verify": "compile generated C and compare it with the reference, sample for sample",
+    "cost": "what one step of generated C costs on microcontrollers: instructions, cycles, flash, RAM, stack",
+    "study": "how much memory a controller needs: accuracy, closed loop and cost of every form and length",
+    "diagnose": "where the gap to the real rig lies, which effect causes it, and how far it shrinks",
+    "replay": "run a rig, its effects included, on the inputs of logs",
+    "report": "one self-contained HTML page of a chain, a study or a diagnosis",
+    "trial": "sealed cases: make them, diagnose them blind, unseal and score",
+    "demo": "all of it on the example logs: model, controller, verified C, and a sealed case diagnosed; "
+    "with a report",
+}
 
 _PROLOGUE = """From a CSV of step tests to a verified fractional-order controller on a microcontroller.
 
@@ -100,9 +102,8 @@ def _meant(word: str, known: Iterable[str], prog: str) -> str:
 
 def _short_help() -> str:
     """What there is, in one screen."""
-    helps = {name: import_module(f"focgen.cli.{name}").HELP for name in commands()}
-    width = max(map(len, helps))
-    lines = [f"  {name:{width}s}  {text}" for name, text in helps.items()]
+    width = max(map(len, commands()))
+    lines = [f"  {name:{width}s}  {_COMMANDS[name]}" for name in commands()]
     return "\n".join(
         [_PROLOGUE, "commands:", *lines, "", "`focgen COMMAND --help` shows an example of each."]
     )
@@ -110,7 +111,7 @@ def _short_help() -> str:
 
 def parser(only: str | None = None) -> argparse.ArgumentParser:
     """The parser of the whole command line, or with one command ``only``, so that the others need not be
-    loaded.
+    loaded; with ``""`` each is there by its name and line, and none is loaded.
     """
     style = argparse.RawDescriptionHelpFormatter
     top = _Parser(prog="focgen", description=_PROLOGUE, formatter_class=style)
@@ -119,16 +120,29 @@ def parser(only: str | None = None) -> argparse.ArgumentParser:
     top.add_argument("--print-completion", choices=SHELLS, action=PrintCompletion, help=about)
     sub = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name in (only,) if only in commands() else commands():
-        module = import_module(f"focgen.cli.{name}")
-        one = sub.add_parser(
-            name, help=module.HELP, description=module.HELP, epilog=module.EXAMPLE, formatter_class=style
-        )
-        module.add_arguments(one)
-        one.add_argument(
-            "--json", action="store_true", help="one JSON object on stdout, everything else on stderr"
-        )
-        one.set_defaults(run=module.run)
+        about = _COMMANDS[name]
+        one = sub.add_parser(name, help=about, description=about, formatter_class=style)
+        if only != "":
+            _load(name, one)
     return top
+
+
+def _load(name: str, one: argparse.ArgumentParser) -> None:
+    """Give a command's parser its arguments and what runs it."""
+    module = import_module(f"focgen.cli.{name}")
+    one.epilog = module.EXAMPLE
+    module.add_arguments(one)
+    one.add_argument(
+        "--json", action="store_true", help="one JSON object on stdout, everything else on stderr"
+    )
+    one.set_defaults(run=module.run)
+
+
+def _needed(argv: Sequence[str]) -> str | None:
+    """What of the command line has to be loaded for these arguments, as :func:`parser` takes it."""
+    if argv[0] in ("--help", "-h", "--version"):
+        return ""
+    return argv[0] if argv[0] in commands() else None
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -167,7 +181,7 @@ def _run(argv: Sequence[str]) -> int:
     if not argv[0].startswith("-") and argv[0] not in commands():
         raise FocgenError(argv[0], "is no command", _meant(argv[0], commands(), "focgen"))
     check_epoch()
-    args = parser(argv[0]).parse_args(argv)
+    args = parser(_needed(argv)).parse_args(argv)
     _check_empty(argv)
     outcome = args.run(args)
     text = to_json(outcome.payload) if args.json else for_terminal(outcome.text.rstrip("\n")) + "\n"

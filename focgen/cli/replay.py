@@ -7,8 +7,6 @@ import argparse
 from focgen.cli.outcome import Outcome
 from focgen.rig.replay import replay
 
-HELP = "run a rig, its effects included, on the inputs of logs"
-
 EXAMPLE = """example:
   focgen replay diagnosis/refitted.toml new.csv
   focgen replay diagnosis/augmented.toml new.csv

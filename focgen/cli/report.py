@@ -7,7 +7,6 @@ from argparse import ArgumentParser, Namespace
 import focgen
 from focgen.cli.outcome import Outcome
 
-HELP = "one self-contained HTML page of a chain, a study or a diagnosis"
 EXAMPLE = """examples:
   focgen report gap --out gap.html
   focgen report identified.toml logs/steps.csv controller.toml firmware verification.json --out chain.html

@@ -12,7 +12,6 @@ from focgen.report.control import simulation_pictures
 from focgen.report.control_summary import simulation_payload, simulation_text
 from focgen.report.pages.control import simulation_page
 
-HELP = "the closed loop of rig and controller at a row of set points"
 EXAMPLE = """example:
   focgen simulate identified.toml controller.toml --setpoints 0.002 0.006 0.01 0.014 --report pictures
 

@@ -13,8 +13,6 @@ from focgen.report.study_summary import study_text
 from focgen.studies.study import SUBJECTS, study
 from focgen.studies.write import payload
 
-HELP = "how much memory a controller needs: accuracy, closed loop and cost of every form and length"
-
 EXAMPLE = """examples:
   focgen study memory controller.toml --out memory
   focgen study memory controller.toml --out memory --lengths 100 1000 --arithmetic q31 --target cortex-m4

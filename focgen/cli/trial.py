@@ -19,7 +19,6 @@ from focgen.trials.tables import full_text, markdown
 from focgen.trials.trial import ACTIONS, trial
 
 _DRAWN = re.compile(r"reliability\.png|confusion_[ABC]_[a-z]+\.png")
-HELP = "sealed cases: make them, diagnose them blind, unseal and score"
 
 EXAMPLE = """examples:
   focgen trial make trials/c --signals C --cases 200 --seed 1000

@@ -10,7 +10,6 @@ from focgen.report.firmware_summary import verification_payload
 from focgen.verification.compare import TargetResult
 from focgen.verification.verify import TARGETS, Verification, verify
 
-HELP = "compile generated C and compare it with the reference, sample for sample"
 EXAMPLE = """example:
   focgen verify firmware --samples 100000
 

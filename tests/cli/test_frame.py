@@ -70,6 +70,17 @@ def test_every_command_is_a_function_of_its_name():
         assert callable(getattr(focgen, name)), name
 
 
+@pytest.mark.parametrize("word", ["--help", "-h", "--version"])
+def test_what_focgen_is_is_said_at_once(word):
+    """The libraries of all commands took seconds to load for it."""
+    told = (
+        f"import sys; from focgen.cli.main import main\ntry: main(['{word}'])\nfinally: print([*sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True)
+    assert done.returncode == 0 and "focgen" in done.stdout
+    assert "'scipy'" not in done.stdout
+
+
 def test_a_closed_pipe_is_no_error():
     shell = f"{sys.executable} -m focgen --help | head -1"
     done = subprocess.run(shell, shell=True, capture_output=True, text=True)
