@@ -46,7 +46,8 @@ from focgen.diagnosis.proposals.next_experiment import NEXT, propose
 from focgen.diagnosis.verdict import compose
 from focgen.diagnosis.verdict.conclude import conclude
 from focgen.diagnosis.verdict.evidence import drawn_of
-from focgen.diagnosis.verdict.unexplained import is_noise
+from focgen.diagnosis.verdict.in_between import hiding, leaves_far_less, without
+from focgen.diagnosis.verdict.unexplained import is_noise, is_unknown
 from focgen.logs.experiment import Experiment
 from focgen.logs.filled import with_readings
 from focgen.logs.read import Logs, each_of
@@ -103,15 +104,9 @@ def diagnose(
     nominal, session = decimated(nominal, session)
     session = with_readings(session)
     session = begun_session(nominal, session)
-    explanations = explain_all(nominal, session, NUMBERS.nats, only, bootstrap)
-    nominal = explanations[0].with_intersample(nominal)
-    search = _Search(nominal, only, bootstrap)
-    explanations, session = _rested(search, explanations, session)
-    explanations, session = _slow(search, explanations, session)
-    explanations, session = _told_by_another(search, explanations, session)
-    explanations, session = _lasting(search, explanations, session)
-    rigs = compose.compose(nominal, explanations, held_as_fitted(explanations[0].best, session))
-    explanations, rigs, session = _carried_on(search, explanations, rigs, session)
+    found = _found(nominal, session, only, bootstrap)
+    found = _unhidden(found, only, bootstrap) if only is None else found
+    nominal, explanations, rigs, session = found.nominal, found.explanations, found.rigs, found.session
     session = begun_as_found(explanations[0].best, rigs.fitted, rigs.placed, session)
     session = in_windows(rigs.fitted, session, rigs.placed)
     rigs, diagnosis, evidence = conclude(nominal, session, rigs, explanations, ran, only is not None)
@@ -129,6 +124,43 @@ def diagnose(
 
         write(out, diagnosis, proposed[1] if proposed else None, pictures, given)
     return diagnosis
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """What was found of a ``session``: its ``explanations``, and the ``rigs`` that they amount to; the
+    ``nominal`` rig with what its command does between samples."""
+
+    nominal: Rig
+    explanations: tuple[Explanation, ...]
+    rigs: compose.Rigs
+    session: tuple[Experiment, ...]
+
+
+def _found(
+    nominal: Rig, session: tuple[Experiment, ...], only: Sequence[str] | None, bootstrap: int
+) -> _Found:
+    explanations = explain_all(nominal, session, NUMBERS.nats, only, bootstrap)
+    nominal = explanations[0].with_intersample(nominal)
+    search = _Search(nominal, only, bootstrap)
+    explanations, session = _rested(search, explanations, session)
+    explanations, session = _slow(search, explanations, session)
+    explanations, session = _told_by_another(search, explanations, session)
+    explanations, session = _lasting(search, explanations, session)
+    rigs = compose.compose(nominal, explanations, held_as_fitted(explanations[0].best, session))
+    return _Found(nominal, *_carried_on(search, explanations, rigs, session))
+
+
+def _unhidden(found: _Found, only: Sequence[str] | None, bootstrap: int) -> _Found:
+    """What is found, made anew without a signal in between whose noise hides what the output shows, where
+    that leaves far less of the output."""
+    role = hiding(found.rigs, found.session, found.explanations)
+    if role is None:
+        return found
+    step(f"without the {role}")
+    bare = _found(found.nominal, without(found.session, role), only, bootstrap)
+    closer = leaves_far_less(bare.rigs, bare.session, found.rigs, found.session)
+    return bare if closer and not any(map(is_unknown, bare.explanations)) else found
 
 
 @dataclass(frozen=True)

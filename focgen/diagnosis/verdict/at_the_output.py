@@ -1,0 +1,62 @@
+"""What an effect changes at the output, which may be read with less noise than the signal of its own segment.
+
+A nominal chain is off by itself by part of the noise, for it was fitted until what was left could not be
+seen. The output was read when it was fitted, too. So a signal in between, read with more noise, does not make
+the chain any worse: what an effect changes counts where it is seen best.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from focgen.diagnosis.belief.standing import holds
+from focgen.diagnosis.fitting.fit import Weighing
+from focgen.diagnosis.hypotheses.explain import Explanation
+from focgen.diagnosis.hypotheses.rivals import Cause, without_family
+from focgen.diagnosis.numbers import NUMBERS
+from focgen.diagnosis.verdict import compose
+from focgen.logs.experiment import Experiment
+from focgen.rig.rig import Rig
+
+
+def seen_at_the_output(
+    rig: Rig, logs: Sequence[Experiment], explanations: Sequence[Explanation]
+) -> list[Explanation]:
+    """Explanations whose causes change what they change where it is seen best, at the end of their segment or
+    at the output. Those that left a segment, for the chain was as good as sure to be off by itself, are back
+    where that is not so any more."""
+    seen = list(explanations)
+    for place, e in enumerate(explanations[:-1]):
+        whole = e if e.causes else e.whole
+        if whole is None or all(c.rivals[0].off < np.log(NUMBERS.rare) for c in whole.causes):
+            continue  # what changes so much is in no chain that was fitted
+        beside = (*seen[:place], whole, *seen[place + 1 :])
+        causes = tuple(_where_it_is_seen_best(rig, logs, beside, place, c) for c in whole.causes)
+        if e.causes or not any(holds(c.rivals[0].off) for c in causes):
+            seen[place] = replace(whole, causes=causes)
+    return seen
+
+
+def _where_it_is_seen_best(
+    rig: Rig, logs: Sequence[Experiment], explanations: Sequence[Explanation], place: int, cause: Cause
+) -> Cause:
+    """A cause of the explanation at a ``place``, its rivals' changes larger by as much as the output shows
+    more of it than the segment does."""
+    own, first = explanations[place], cause.rivals[0]
+    bare = replace(own, best=without_family(own.best, first.effect, Weighing(own.ar)))
+    without = [*explanations[:place], bare, *explanations[place + 1 :]]
+    there, gone = (_output(rig, each, logs) for each in (explanations, without))
+    left = np.concatenate([log["output"] - made for log, made in zip(logs, there)])
+    change = np.concatenate(gone) - np.concatenate(there)
+    more = float(np.sqrt(np.mean(change**2) / max(np.mean(left**2), 1e-300))) / max(first.change, 1e-300)
+    larger = max(more, 1.0)
+    return replace(cause, rivals=tuple(replace(r, change=larger * r.change) for r in cause.rivals))
+
+
+def _output(rig: Rig, explanations: Sequence[Explanation], logs: Sequence[Experiment]) -> list[np.ndarray]:
+    """The output that the whole chain makes, by experiment."""
+    rigs = compose.compose(rig, explanations, logs)
+    return [made["output"] for made in compose.simulated(rigs.fitted, rigs.placed, logs)]

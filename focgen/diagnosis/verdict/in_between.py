@@ -1,0 +1,84 @@
+"""A signal in between that is read with so much noise that it hides what the output shows.
+
+A session is explained segment by segment, each as far as the noise at its end lets see. What is ahead of a
+noisy gauge may show at the output alone, of which the next segment takes it for what its input may be off by.
+Without the gauge the output tells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from focgen.diagnosis.fitting.predictability import predictable_share
+from focgen.diagnosis.hypotheses.explain import Explanation
+from focgen.diagnosis.numbers import NUMBERS
+from focgen.diagnosis.problem.segments import make
+from focgen.diagnosis.verdict import compose
+from focgen.logs.experiment import Experiment
+from focgen.rig.session import joined
+
+
+def hiding(rigs: compose.Rigs, logs: Sequence[Experiment], explanations: Sequence[Explanation]) -> str | None:
+    """The signal in between whose noise the rest of the chain hears loudest, above the noise that comes after
+    it, where inputs predict so much of what all explanations together leave of the output that without it far
+    less might be left."""
+    loud = {a.segment.exit: _heard(a, b) for a, b in pairwise(explanations)}
+    role = max(loud, key=lambda r: loud[r], default=None)
+    if role is None or loud[role] < 1.0:
+        return None
+    return role if _still_foretold(rigs, logs, explanations) > 1.0 - NUMBERS.unlikely else None
+
+
+def leaves_far_less(
+    bare: compose.Rigs, shown: Sequence[Experiment], rigs: compose.Rigs, logs: Sequence[Experiment]
+) -> bool:
+    """Whether effects found without the signal bring the output far closer than what was found with it."""
+    found = compose.mean_square(shown, compose.simulated(bare.fitted, bare.placed, shown))
+    before = compose.mean_square(logs, compose.simulated(rigs.fitted, rigs.placed, logs))
+    return bool(bare.placed) and found < NUMBERS.unlikely * before
+
+
+def without(logs: Sequence[Experiment], role: str) -> tuple[Experiment, ...]:
+    """The session as if a signal had not been logged, with a note on that."""
+    note = f"the {role} is so noisy that it hides what the output shows: diagnosed without it"
+
+    def bare(log: Experiment) -> Experiment:
+        others = [r for r in log.signals if r != role]
+        return replace(
+            log,
+            signals={r: log.signals[r] for r in others},
+            readings={r: log.readings[r] for r in others if r in log.readings},
+            begins={r: log.begins[r] for r in others if r in log.begins},
+            notes=(*log.notes, note),
+        )
+
+    return tuple(bare(log) for log in logs)
+
+
+def _heard(e: Explanation, after: Explanation) -> float:
+    """The root mean square of what the noise at the end of a segment makes of the next one's output, over
+    that of what is left there."""
+    own, then = e.best.problem.at_every_row, after.best.problem.at_every_row
+    off = own.segment.y - own.simulate(e.best.vector)
+    noise = np.concatenate([part[::-1] for part in own.segment.parts(off)])
+    noise *= np.sqrt(max(1.0 - e.predictability.share, 0.0))
+    moved = replace(then, segment=then.segment.anew(x=then.segment.x + noise), memory={})
+    answer = moved.simulate(after.best.vector) - then.simulate(after.best.vector)
+    left = after.best.problem.residual(after.best.vector)
+    return float(np.sqrt(np.mean(answer**2) / max(np.mean(left**2), 1e-300)))
+
+
+def _still_foretold(
+    rigs: compose.Rigs, logs: Sequence[Experiment], explanations: Sequence[Explanation]
+) -> float:
+    """The share that inputs predict of what the whole chain leaves of the output."""
+    segment = make(logs, explanations[0].segment.entry, explanations[-1].segment.exit)
+    made = np.concatenate([m["output"] for m in compose.simulated(rigs.fitted, rigs.placed, logs)])
+    left = joined(logs, "output") - made
+    left = left if segment.readings is None else left[segment.readings]
+    response = explanations[-1].best.problem.references.clocks["response"]
+    return predictable_share(segment, segment.weight * left, response)

@@ -1,0 +1,46 @@
+"""A gauge in between that is far noisier than the output: it may hide nothing that the output shows.
+
+Red when a session with such a gauge tells less than the same session without it.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from focgen.diagnosis.diagnose import diagnose
+from tests.diagnosis_rig import RIG, session
+
+CAMERA = 4.0  # times the output's noise
+RIG_ROLES = ("pressure", "curvature")
+
+
+def firsts(found):
+    return [cause.candidates[0].effect for cause in found.causes]
+
+
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
+def test_a_drift_that_the_output_shows_is_named_whatever_the_camera_shows(seed):
+    """It was ``unknown``, and beside the output alone a ``gain_drift``, 0.95."""
+    found = diagnose(RIG, session(seed, camera=CAMERA, drift=2e-4), pictures=False)
+    alone = diagnose(RIG, session(seed, drift=2e-4, roles=("pressure",)), pictures=False)
+    assert firsts(found) == firsts(alone) == ["gain_drift"]
+    assert found.causes[0].candidates[0].confidence > 0.9
+    assert found.gap.explained < 1.05 * alone.gap.explained
+    assert any("the curvature is so noisy" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("faults, said", [({}, ("none", "parameters")), ({"vent": 0.1}, ("named",))])
+def test_a_noisy_camera_is_kept_where_it_hides_nothing(faults, said):
+    found = diagnose(RIG, session(2, camera=CAMERA, **faults), pictures=False)
+    assert found.verdict in said
+    assert not any("so noisy" in note for note in found.notes)
+
+
+def test_what_the_chain_may_be_off_by_is_told_where_it_is_seen_best():
+    """Of the camera's noise the dead zone changes half: a nominal chain that is off by as much, 76 %. Of the
+    output's it changes all of it."""
+    logs, bare = (session(1, camera=2.0, zone=0.012, roles=r) for r in (RIG_ROLES, ("pressure",)))
+    found, alone = (diagnose(RIG, of, pictures=False) for of in (logs, bare))
+    assert firsts(found) == firsts(alone) == ["dead_zone"]
+    sure, as_sure = (f.causes[0].candidates[0].confidence for f in (found, alone))
+    assert sure > 0.6 and sure > as_sure - 0.1
