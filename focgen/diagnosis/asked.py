@@ -26,9 +26,20 @@ def usable(logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
         bad = [role for role, values in log.signals.items() if not np.all(np.isfinite(values))]
         if bad and bad[0] != "reference":
             raise LogError(log.name, f"has gaps in {bad[0]}", "cut them out with --from and --to")
+    _check_one_input(logs)
     if sum(map(len, logs)) < 40:
         raise LogError(logs[0].name, "has too few samples to diagnose", "record at least 40 samples")
     return tuple(logs)
+
+
+def _check_one_input(logs: Sequence[Experiment]) -> None:
+    """Raise LogError where no input is in every log: a session has one."""
+    for role in ("command", "pressure"):
+        if all(role in log for log in logs):
+            return
+    log = next(log for log in logs if "command" not in log)
+    remedy = "diagnose logs of a command and logs of a pressure apart, or record both in each"
+    raise LogError(log.name, "has no command, which other logs have without a pressure", remedy)
 
 
 def check_asked(only: Sequence[str] | None, bootstrap: int) -> None:

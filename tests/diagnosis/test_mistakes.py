@@ -217,3 +217,11 @@ def test_a_command_that_is_logged_late_is_no_resonance():
 def test_what_answers_late_or_less_is_not_taken_for_it(case):
     found = diagnose(RIG, session(1, roles=(), **case))
     assert found.verdict in ("named", "set") and not any("late (" in note for note in found.notes)
+
+
+def test_logs_of_a_command_and_logs_of_a_pressure_are_no_one_session():
+    """They ended in a traceback."""
+    only = [session(1, roles=("pressure",))[0], session(1, roles=())[1]]
+    driven = replace(only[0], signals={r: v for r, v in only[0].signals.items() if r != "command"})
+    with pytest.raises(LogError, match=f"{driven.name}: has no command, which other logs have"):
+        diagnose(RIG, [driven, only[1]], pictures=False)

@@ -15,12 +15,13 @@ from functools import lru_cache
 import numpy as np
 
 from focgen.diagnosis.fitting.fit import WHITE, Fit, fit
+from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import Problem
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig.corners import transfer_of
 from focgen.rig.rig import Rig
 
-_OF_RESPONSE = 0.1  # of the response of a rig that has no time constant but integrates
+_OF_RESPONSE = 1.0  # of the response of a rig that has no time constant but integrates
 _ROUNDS = 12  # of the last fit
 
 
@@ -69,14 +70,20 @@ def settled(of: Fit) -> Fit:
     return fit(of.problem, _to_the_path(of).vector, WHITE, 0) if of.problem.segment.pace else of
 
 
+def as_they_show(of: Fit, without: Fit) -> tuple[Fit, Fit]:
+    """Two fits by which it is seen what the rig does: to its whole path where a pump makes that, which adds
+    up without further errors, or where the first leaves no more of it than noise; others as they are."""
+    segment, rig = of.problem.segment, of.problem.nominals.rig
+    if not segment.pace:
+        return of, without
+    whole = _to_the_path(of)
+    noise = float(np.mean(of.problem.residual(of.vector) ** 2)) / segment.recent_share
+    left = float(np.mean(whole.problem.residual(whole.vector) ** 2))
+    shown = rig.integrator == "regulator" or noise > NUMBERS.above**2 * left
+    return (whole, _to_the_path(without)) if shown else (of, without)
+
+
 @lru_cache(maxsize=4)
-def as_it_shows(of: Fit) -> Fit:
-    """A fit by which it is seen what the rig does: to its whole path where a pump makes that, which adds up
-    without further errors; others as they are."""
-    pumped = of.problem.segment.pace and of.problem.nominals.rig.integrator == "regulator"
-    return _to_the_path(of) if pumped else of
-
-
 def _to_the_path(of: Fit) -> Fit:
     problem = of.problem
     plain: Problem = replace(problem, segment=replace(problem.segment, pace=0.0), memory={})

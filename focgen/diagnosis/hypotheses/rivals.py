@@ -12,7 +12,7 @@ from focgen.diagnosis.belief.choice import NEAR, rarity
 from focgen.diagnosis.belief.further import Ground, Surroundings
 from focgen.diagnosis.belief.standing import any_of, behind, holds, nominal_off
 from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, problem_residual
-from focgen.diagnosis.fitting.integrating import as_it_shows
+from focgen.diagnosis.fitting.integrating import as_they_show
 from focgen.diagnosis.hypotheses.search import Ranking, evidence, is_itself, on_all, rank
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
 from focgen.rig.effects import library
@@ -182,8 +182,8 @@ def _other_forms(name: str, of: Fit, best: Fit, ranking: Ranking, beside: Beside
 
 def change_of(of: Fit, without: Fit) -> float:
     """The root mean square of what a fit's output is another by than ``without``, over that of what it
-    leaves; of a pump's whole path, to which both are fitted anew."""
-    left, before = (problem_residual(as_it_shows(f)) for f in (of, without))
+    leaves; of a whole path, where that shows, to which both are fitted anew."""
+    left, before = (problem_residual(f) for f in as_they_show(of, without))
     change = left - before
     return float(np.sqrt(np.mean(change**2) / max(np.mean(left**2), 1e-300)))
 

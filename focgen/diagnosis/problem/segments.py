@@ -158,6 +158,13 @@ class Segment:
             return signal
         return signal - kernels.lag(signal, self.run.rest, self.run.h, self.pace, self.pace)
 
+    @cached_property
+    def recent_share(self) -> float:
+        """The part of white noise's mean square that is in its recent part."""
+        impulse = np.zeros(len(self.run.rest))
+        impulse[0] = 1.0
+        return float(np.sum(self.recent(impulse) ** 2))
+
     def parts(self, signal: np.ndarray) -> list[np.ndarray]:
         """``signal`` (n, …) by experiment."""
         return [signal[first:last] for first, last in self.run.spans]

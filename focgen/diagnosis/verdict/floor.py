@@ -6,7 +6,6 @@ import numpy as np
 
 from focgen.diagnosis.fitting.fit import problem_residual
 from focgen.diagnosis.hypotheses.explain import Explanation
-from focgen.diagnosis.problem.segments import Segment
 from focgen.rig.effects import STEP, library
 
 
@@ -20,17 +19,10 @@ def floor(last: Explanation, explained: float) -> float:
     readings lie a step off. The floor is the noise, not what the rounding makes of it.
     """
     segment = last.segment
-    parts = [np.mean(p**2) / _kept(segment) for p in segment.parts(problem_residual(last.best))]
+    parts = [np.mean(p**2) / segment.recent_share for p in segment.parts(problem_residual(last.best))]
     found = min(float(np.mean(parts)) * (1 - last.predictability.share), float(np.median(parts)), explained)
     step = _step(last)
     return min(found, (np.sqrt(np.pi / 2) * explained / step) ** 2) if step else found
-
-
-def _kept(segment: Segment) -> float:
-    """The part of white noise's mean square that is in its recent part."""
-    impulse = np.zeros(len(segment.run.rest))
-    impulse[0] = 1.0
-    return float(np.sum(segment.recent(impulse) ** 2))
 
 
 def _step(last: Explanation) -> float | None:
