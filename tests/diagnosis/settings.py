@@ -13,7 +13,6 @@ CONSTANTS = {
     "controller/check.py": ["_LARGE", "_NEARLY", "_RESOLVED", "_ROUNDED", "_STEADY", "_TIED"],
     "controller/stamps.py": ["LOST", "UNSTEADY", "_FOLLOWING"],
     "fitting/fit.py": ["FIXED", "STEP", "_HOPELESS", "_LAGGING", "_NOTHING", "_SURE"],
-    "fitting/integrating.py": ["_OF_RESPONSE"],
     "fitting/jumps.py": ["_ABOUT", "_FINEST", "_STEP", "_WORTH"],
     "fitting/predictability.py": ["_DAMPING", "_PERIODS", "_QUIETEST", "_RIDGES", "_SAMPLES"],
     "fitting/realign.py": ["_TAKEN"],

@@ -21,14 +21,14 @@ from focgen.fractional.transfer import TransferFunction
 from focgen.rig.corners import transfer_of
 from focgen.rig.rig import Rig
 
-_OF_RESPONSE = 1.0  # of the response of a rig that has no time constant but integrates
 _ROUNDS = 12  # of the last fit
 
 
 def pace(rig: Rig, stages: Sequence[str], response: float) -> float:
-    """The longest time constant of a stage that integrates, s; 0 where none does."""
+    """The longest time constant of a stage that integrates, s, or the ``response`` of the rig where that only
+    adds up; 0 where none does."""
     transfers = [t for stage in stages if (t := transfer_of(rig, stage)) is not None]
-    found = [_slowest(t) or _OF_RESPONSE * response for t in transfers if not np.isfinite(t.dc_gain)]
+    found = [_slowest(t) or response for t in transfers if not np.isfinite(t.dc_gain)]
     return max(found, default=0.0)
 
 
