@@ -6,7 +6,7 @@ Red when what a valve's form leaves of its spool's motion is taken for something
 import numpy as np
 import pytest
 
-from focgen.diagnosis.diagnose import explain_all
+from focgen.diagnosis.findings import explain_all
 from focgen.diagnosis.hypotheses.initial import begun_session
 from focgen.logs.experiment import Experiment
 from tests.diagnosis_rig import RIG, H, _fractional, _lag, _noise, commands

@@ -5,6 +5,8 @@ Red when a session with such a gauge tells less than the same session without it
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from focgen.diagnosis.diagnose import diagnose
@@ -29,7 +31,10 @@ def test_a_drift_that_the_output_shows_is_named_whatever_the_camera_shows(seed):
     assert any("the curvature is so noisy" in note for note in found.notes)
 
 
-@pytest.mark.parametrize("faults, said", [({}, ("none", "parameters")), ({"vent": 0.1}, ("named",))])
+@pytest.mark.parametrize(
+    "faults, said",
+    [({}, ("none", "parameters")), pytest.param({"vent": 0.1}, ("named",), marks=pytest.mark.long)],
+)
 def test_a_noisy_camera_is_kept_where_it_hides_nothing(faults, said):
     found = diagnose(RIG, session(2, camera=CAMERA, **faults), pictures=False)
     assert found.verdict in said
@@ -44,3 +49,19 @@ def test_what_the_chain_may_be_off_by_is_told_where_it_is_seen_best():
     assert firsts(found) == firsts(alone) == ["dead_zone"]
     sure, as_sure = (f.causes[0].candidates[0].confidence for f in (found, alone))
     assert sure > 0.6 and sure > as_sure - 0.1
+
+
+def test_what_left_its_segment_is_back_where_the_output_shows_it():
+    """Of the camera's noise it changes a third, and had left: no name, and no experiment to tell."""
+    found = diagnose(RIG, session(1, camera=2.0, zone=0.008), pictures=False)
+    assert firsts(found) == ["dead_zone"]
+    assert any("the nominal rig may be off by itself" in note for note in found.notes)
+    assert found.next_experiment is not None
+
+
+def test_a_gauge_that_is_dropped_is_still_looked_at():
+    """Its unit is off by a hundred; only that it is noisy was said."""
+    logs = session(1, camera=CAMERA, drift=2e-4)
+    off = [replace(log, signals=dict(log.signals) | {"curvature": 100.0 * log["curvature"]}) for log in logs]
+    found = diagnose(RIG, off, pictures=False)
+    assert any("curvature in a unit 100 times smaller?" in warning for warning in found.warnings)

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from focgen.diagnosis.diagnose import diagnose, explain_all
+from focgen.diagnosis.diagnose import diagnose
+from focgen.diagnosis.findings import explain_all
 from focgen.diagnosis.fitting.fit import WHITE, fit
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.hypotheses.nuisances import problem_of

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from focgen.diagnosis import diagnose as module
+from focgen.diagnosis import findings as module
 from focgen.diagnosis.hypotheses.initial import rested_long
 from focgen.logs.experiment import Experiment
 from focgen.rig.recalled import all_ahead

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from focgen.diagnosis.diagnose import diagnose, explain_all
+from focgen.diagnosis.diagnose import diagnose
+from focgen.diagnosis.findings import explain_all
 from focgen.diagnosis.hypotheses.bootstrap import threshold
 from focgen.diagnosis.hypotheses.explain import candidates_for, explain
 from focgen.diagnosis.numbers import NUMBERS

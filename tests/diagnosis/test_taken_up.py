@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from focgen.diagnosis.diagnose import diagnose, explain_all
+from focgen.diagnosis.diagnose import diagnose
+from focgen.diagnosis.findings import explain_all
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.verdict.taken_up import taken_up
 from tests.diagnosis_rig import RIG, session

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from focgen.diagnosis import diagnose as module
+from focgen.diagnosis import findings as module
 
 
 @pytest.mark.parametrize("teller", ["begins", "what carries on"])

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from focgen.diagnosis.diagnose import explain_all
+from focgen.diagnosis.findings import explain_all
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.verdict import unsteady as judging
 from focgen.diagnosis.verdict.unsteady import unsteady

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from focgen.diagnosis.diagnose import diagnose, explain_all
+from focgen.diagnosis.diagnose import diagnose
+from focgen.diagnosis.findings import explain_all
 from focgen.diagnosis.hypotheses.explain import candidates_for
 from focgen.diagnosis.hypotheses.initial import begun_session
 from focgen.diagnosis.problem.segments import make

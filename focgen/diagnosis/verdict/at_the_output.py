@@ -24,7 +24,7 @@ from focgen.rig.rig import Rig
 
 def seen_at_the_output(
     rig: Rig, logs: Sequence[Experiment], explanations: Sequence[Explanation]
-) -> list[Explanation]:
+) -> tuple[Explanation, ...]:
     """Explanations whose causes change what they change where it is seen best, at the end of their segment or
     at the output. Those that left a segment, for the chain was as good as sure to be off by itself, are back
     where that is not so any more."""
@@ -34,26 +34,34 @@ def seen_at_the_output(
         if whole is None or all(c.rivals[0].off < np.log(NUMBERS.rare) for c in whole.causes):
             continue  # what changes so much is in no chain that was fitted
         beside = (*seen[:place], whole, *seen[place + 1 :])
-        causes = tuple(_where_it_is_seen_best(rig, logs, beside, place, c) for c in whole.causes)
-        if e.causes or not any(holds(c.rivals[0].off) for c in causes):
+        clearer = [_clearer(rig, logs, beside, place, c) for c in whole.causes]
+        causes = tuple(_changed(c, times) for c, times in zip(whole.causes, clearer))
+        if max(clearer) > 1.0 and (e.causes or not any(holds(c.rivals[0].off) for c in causes)):
             seen[place] = replace(whole, causes=causes)
-    return seen
+    return tuple(seen)
 
 
-def _where_it_is_seen_best(
+def _changed(cause: Cause, times: float) -> Cause:
+    """A cause whose rivals all change so many times as much, if that is more."""
+    rivals = tuple(replace(r, change=max(times, 1.0) * r.change) for r in cause.rivals)
+    return replace(cause, rivals=rivals)
+
+
+def _clearer(
     rig: Rig, logs: Sequence[Experiment], explanations: Sequence[Explanation], place: int, cause: Cause
-) -> Cause:
-    """A cause of the explanation at a ``place``, its rivals' changes larger by as much as the output shows
-    more of it than the segment does."""
+) -> float:
+    """How many times as clearly as its own segment the output shows a cause of the explanation at a
+    ``place``."""
     own, first = explanations[place], cause.rivals[0]
     bare = replace(own, best=without_family(own.best, first.effect, Weighing(own.ar)))
     without = [*explanations[:place], bare, *explanations[place + 1 :]]
     there, gone = (_output(rig, each, logs) for each in (explanations, without))
-    left = np.concatenate([log["output"] - made for log, made in zip(logs, there)])
-    change = np.concatenate(gone) - np.concatenate(there)
-    more = float(np.sqrt(np.mean(change**2) / max(np.mean(left**2), 1e-300))) / max(first.change, 1e-300)
-    larger = max(more, 1.0)
-    return replace(cause, rivals=tuple(replace(r, change=larger * r.change) for r in cause.rivals))
+    left, change = 0.0, 0.0
+    for log, made, other in zip(logs, there, gone, strict=True):
+        read = log.read("output")
+        left += float(np.sum((log["output"] - made)[read] ** 2))
+        change += float(np.sum((other - made)[read] ** 2))
+    return float(np.sqrt(change / max(left, 1e-300))) / max(first.change, 1e-300)
 
 
 def _output(rig: Rig, explanations: Sequence[Explanation], logs: Sequence[Experiment]) -> list[np.ndarray]:

@@ -90,7 +90,7 @@ def _with_zero(rig: Rig, last: Fit, placed: Sequence[Placed], logs: Sequence[Exp
     if abs(zero) < _SHOWN * last.problem.segment.level_out:
         return rig
     found = replace(rig, zero=rig.zero + zero)
-    return found if _gap(found, placed, logs) < _gap(rig, placed, logs) else rig
+    return found if gap(found, placed, logs) < gap(rig, placed, logs) else rig
 
 
 def _closest(
@@ -105,10 +105,10 @@ def _closest(
         return _with_zero(_moved(rig, part), last, placed, logs)
 
     all_moved = moved(fits)
-    if not fits or _gap(all_moved, placed, logs) <= _gap(rig, placed, logs):
+    if not fits or gap(all_moved, placed, logs) <= gap(rig, placed, logs):
         return all_moved
     some = [moved(part) for n in range(len(fits)) for part in combinations(fits, n)]
-    return min(some, key=lambda r: _gap(r, placed, logs))
+    return min(some, key=lambda r: gap(r, placed, logs))
 
 
 def _moved(rig: Rig, fits: Sequence[Fit]) -> Rig:
@@ -117,7 +117,7 @@ def _moved(rig: Rig, fits: Sequence[Fit]) -> Rig:
     return rig
 
 
-def _gap(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment]) -> float:
+def gap(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment]) -> float:
     """The mean square error of the output, of each rig from the pasts that suit it best."""
     logs = in_windows(rig, logs, placed)
     return mean_square(logs, simulated(rig, placed, logs))
@@ -133,7 +133,7 @@ def carried_on(rigs: Rigs, logs: Sequence[Experiment]) -> tuple[Experiment, ...]
     if not lasting:
         return tuple(logs)
     if any(log.paused for log in logs):
-        return with_recalled(rigs.fitted, logs, lambda found: _gap(rigs.fitted, lasting, found), lasting)
+        return with_recalled(rigs.fitted, logs, lambda found: gap(rigs.fitted, lasting, found), lasting)
     return recalled(rigs.fitted, logs, lasting, closer=False)
 
 

@@ -15,7 +15,6 @@ from focgen.diagnosis.hypotheses.search import evidence as nats
 from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Found, Gap, PlainFit
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.verdict import compose
-from focgen.diagnosis.verdict.at_the_output import seen_at_the_output
 from focgen.diagnosis.verdict.cautions import (
     another_command,
     cautions,
@@ -56,12 +55,11 @@ def conclude(
 ) -> tuple[compose.Rigs, Diagnosis, Evidence]:
     """The rigs that the verdict stands for, the diagnosis without a next experiment, and what it rests on.
     ``granted``: the effects are there, however little they explain."""
-    given, explanations = explanations, seen_at_the_output(rig, logs, explanations)
     doubted = {} if granted else sound_parts(explanations)
     explanations = [doubted.get(e, e) for e in explanations]
     off = [] if granted else likelier_nominal(explanations)
     explanations = [unnamed(e, [c for of, c in off if of is e]) for e in explanations]
-    if doubted or off or explanations != list(given):
+    if doubted or off:
         rigs = compose.compose(rig, explanations, logs)
     stands = sorted_out(rig, logs, rigs, explanations, granted)
     summary, unknown = stands.summary, stands.unknown

@@ -19,26 +19,24 @@ from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.segments import make
 from focgen.diagnosis.verdict import compose
 from focgen.logs.experiment import Experiment
+from focgen.rig.initial import in_windows
 from focgen.rig.session import joined
 
 
-def hiding(rigs: compose.Rigs, logs: Sequence[Experiment], explanations: Sequence[Explanation]) -> str | None:
-    """The signal in between whose noise the rest of the chain hears loudest, above the noise that comes after
-    it, where inputs predict so much of what all explanations together leave of the output that without it far
-    less might be left."""
-    loud = {a.segment.exit: _heard(a, b) for a, b in pairwise(explanations)}
-    role = max(loud, key=lambda r: loud[r], default=None)
-    if role is None or loud[role] < 1.0:
-        return None
-    return role if _still_foretold(rigs, logs, explanations) > 1.0 - NUMBERS.unlikely else None
+def hiding(rigs: compose.Rigs, logs: Sequence[Experiment], explanations: Sequence[Explanation]) -> list[str]:
+    """The signals in between whose noise the rest of the chain hears above the noise that comes after it, the
+    loudest first, where inputs predict so much of what all explanations together leave of the output that
+    without one of them far less might be left."""
+    heard = {a.segment.exit: _heard(a, b) for a, b in pairwise(explanations)}
+    loud = sorted((r for r in heard if heard[r] > 1.0), key=lambda r: -heard[r])
+    return loud if loud and _still_foretold(rigs, logs, explanations) > 1.0 - NUMBERS.unlikely else []
 
 
 def leaves_far_less(
     bare: compose.Rigs, shown: Sequence[Experiment], rigs: compose.Rigs, logs: Sequence[Experiment]
 ) -> bool:
     """Whether effects found without the signal bring the output far closer than what was found with it."""
-    found = compose.mean_square(shown, compose.simulated(bare.fitted, bare.placed, shown))
-    before = compose.mean_square(logs, compose.simulated(rigs.fitted, rigs.placed, logs))
+    found, before = compose.gap(bare.fitted, bare.placed, shown), compose.gap(rigs.fitted, rigs.placed, logs)
     return bool(bare.placed) and found < NUMBERS.unlikely * before
 
 
@@ -59,23 +57,37 @@ def without(logs: Sequence[Experiment], role: str) -> tuple[Experiment, ...]:
     return tuple(bare(log) for log in logs)
 
 
+def with_signals(logs: Sequence[Experiment], of: Sequence[Experiment]) -> tuple[Experiment, ...]:
+    """The session with all signals that the logs ``of`` it have."""
+    return tuple(
+        replace(log, signals=o.signals, readings=o.readings, begins={**o.begins, **log.begins})
+        for log, o in zip(logs, of, strict=True)
+    )
+
+
 def _heard(e: Explanation, after: Explanation) -> float:
     """The root mean square of what the noise at the end of a segment makes of the next one's output, over
     that of what is left there."""
     own, then = e.best.problem.at_every_row, after.best.problem.at_every_row
     off = own.segment.y - own.simulate(e.best.vector)
     noise = np.concatenate([part[::-1] for part in own.segment.parts(off)])
-    noise *= np.sqrt(max(1.0 - e.predictability.share, 0.0))
+    # as loud as it is where it was read, and forgotten where errors add up
+    level = _rms(e.best.problem.residual(e.best.vector)) * np.sqrt(max(1.0 - e.predictability.share, 0.0))
+    noise *= level / max(_rms(noise), 1e-300)
     moved = replace(then, segment=then.segment.anew(x=then.segment.x + noise), memory={})
-    answer = moved.simulate(after.best.vector) - then.simulate(after.best.vector)
-    left = after.best.problem.residual(after.best.vector)
-    return float(np.sqrt(np.mean(answer**2) / max(np.mean(left**2), 1e-300)))
+    answer = then.segment.recent(moved.simulate(after.best.vector) - then.simulate(after.best.vector))
+    return _rms(answer) / max(_rms(after.best.problem.residual(after.best.vector)), 1e-300)
+
+
+def _rms(signal: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(signal**2)))
 
 
 def _still_foretold(
     rigs: compose.Rigs, logs: Sequence[Experiment], explanations: Sequence[Explanation]
 ) -> float:
     """The share that inputs predict of what the whole chain leaves of the output."""
+    logs = in_windows(rigs.fitted, logs, rigs.placed)
     segment = make(logs, explanations[0].segment.entry, explanations[-1].segment.exit)
     made = np.concatenate([m["output"] for m in compose.simulated(rigs.fitted, rigs.placed, logs)])
     left = joined(logs, "output") - made
