@@ -10,6 +10,10 @@ import numpy as np
 import pytest
 
 from focgen.diagnosis.diagnose import diagnose
+from focgen.diagnosis.fitting.fit import WHITE, fit
+from focgen.diagnosis.hypotheses.nuisances import uncertain
+from focgen.diagnosis.problem.segments import make
+from focgen.diagnosis.verdict.pieces import pieces
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.rig import LinearActuator, Rig, Signals
@@ -56,3 +60,34 @@ def test_a_slow_drift_is_a_drift(drift):
     found = diagnose(BENCH, session(4, drift=drift), only=("sensor_drift", "gain_drift"))
     assert [c.candidates[0].effect for c in found.causes] == ["sensor_drift"]
     assert found.causes[0].candidates[0].confidence > 0.9
+
+
+LIGHT = TransferFunction([(2.0, 0.0)], [(0.4, 2.0), (0.12, 1.0), (1.0, 0.0)])
+SWINGING = Rig("link", H, Signals("t", "y", "u"), LinearActuator(LIGHT))
+
+
+def swinging(seed: int, lost: float):
+    """The same steps on 0.4 y'' + 0.12 y' + y = 2 u, of whose mass a part is ``lost`` from AT on."""
+    pump = np.repeat(LEVELS, N // len(LEVELS))
+    y = v = 0.0
+    seen = np.empty(N)
+    for k, u in enumerate(pump):
+        seen[k] = y
+        for _ in range(20):
+            v += H / 20.0 * (2.0 * u - 0.12 * v - y) / (0.4 * (1.0 - lost * (T[k] >= AT)))
+            y += H / 20.0 * v
+    seen += 0.03 * np.random.default_rng(seed).normal(size=N)
+    return [Experiment("day", H, {"command": pump, "output": seen})]
+
+
+@pytest.mark.parametrize("lost", [0.2, 0.3])
+def test_a_rig_that_is_not_linear_so_far_off_is_fitted_there(lost):
+    """Half of a mass less is far beyond what a linear equation tells of a mode: a part of the way to it left
+    three times as much, and less for a drift."""
+    logs = swinging(1, lost)
+    segment = make(logs, "command", "output")
+    problem = uncertain(SWINGING, segment, logs)
+    nominal = fit(problem, problem.nominal(), WHITE, 20)
+    cut = next(cut for cut in pieces(nominal, WHITE) if not cut.together)
+    assert cut.samples[0] * H == pytest.approx(AT, abs=6.0)  # until the next step nothing moves
+    assert cut.simulated(WHITE).square < 1.1 * cut.square < 0.4 * nominal.sse

@@ -147,6 +147,7 @@ def bent(monkeypatch):
     problem = _Bent(rows, np.zeros(N))
     monkeypatch.setattr(pieces, "innovations", lambda p, v, w, probe=False: p.y - p.made(v))
     monkeypatch.setattr(pieces, "_reach", lambda p, v: (np.array([-9.0, -0.4]), np.array([9.0, 0.4])))
+    monkeypatch.setattr(pieces, "_to_piece", lambda p, start, first, last, w: start)  # what a fit begins with
     problem.simulate = lambda v, probe=False: problem.made(v)
     return problem
 

@@ -17,13 +17,15 @@ from itertools import pairwise
 
 import numpy as np
 
-from focgen.diagnosis.fitting.fit import FIXED, Fit, Weighing, innovations, jacobian
+from focgen.diagnosis.fitting.fit import FIXED, Fit, Weighing, fit, innovations, jacobian
+from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import Problem
 
 _CELLS = 200  # of a session, between which a moment may lie
 _MOST = 3  # moments
 _SHORTEST = 4  # cells between two of them
 _PARTS = (1.0, 0.5, 0.25, 0.0)  # of the way that a linear equation goes
+_ROUNDS = 8  # of a fit to one piece
 _FACTOR = 1.0  # a gain's or a time's logarithm: as far as a piece's may be from that of the fit
 
 
@@ -48,7 +50,8 @@ class Pieces:
 
     def simulated(self, weighing: Weighing) -> Pieces:
         """The same, each piece simulated with parameters of its own: as far on the way to those of the linear
-        equation as leaves least, for the rig need not be linear so far off. What pieces share, they share."""
+        equation as leaves least, for the rig need not be linear so far off. What pieces share, they share.
+        Where that leaves far more than the linear equation, pieces that share nothing are fitted."""
         problem, vector = self.of_fit.problem, self.of_fit.vector
         low, high = _reach(problem, vector)
         ends = list(pairwise([0, *self.samples, len(self.of_fit.innovations)]))
@@ -68,7 +71,29 @@ class Pieces:
             best = np.full(len(ends), np.argmin(np.sum(squares, axis=1)))
         kept = np.stack([ways[k][i] for i, k in enumerate(best)])
         square = float(np.sum(squares[best, np.arange(len(ends))]))
+        if not self.together and self.square < NUMBERS.unlikely * square:
+            full = ways[0]
+            starts = [[kept[i], full[i]] if best[i] else [full[i]] for i in range(len(ends))]
+            kept, square = self._fitted(starts, ends, weighing)
         return replace(self, less=kept, square=max(self.square, square))
+
+    def _fitted(
+        self, starts: Sequence[Sequence[np.ndarray]], ends: Sequence[tuple[int, int]], weighing: Weighing
+    ) -> tuple[np.ndarray, float]:
+        """What the parameters of each piece are less where they are fitted to it, from the best of its
+        ``starts``, and the sum of squares that all pieces leave."""
+        problem, vector = self.of_fit.problem, self.of_fit.vector
+        less, square = [], 0.0
+        for each, (first, last) in zip(starts, ends, strict=True):
+            found = [
+                np.clip(_to_piece(problem, vector - s, first, last, weighing), *_reach(problem, vector))
+                for s in each
+            ]
+            left = [float(np.sum(innovations(problem, v, weighing)[first:last] ** 2)) for v in found]
+            least = int(np.argmin(left))
+            less.append(vector - found[least])
+            square += left[least]
+        return np.stack(less), square
 
     def changes(self) -> Iterator[tuple[int, np.ndarray]]:
         """Each moment's sample, and by how much more leaves the segment from there on until the next (n,), in
@@ -79,14 +104,24 @@ class Pieces:
             yield first, after[first:last] - before[first:last]
 
 
-def pieces(fit: Fit, weighing: Weighing) -> Iterator[Pieces]:
+def pieces(of: Fit, weighing: Weighing) -> Iterator[Pieces]:
     """For one moment, two and three: the best with all parameters others; with each of the rig's own alone;
     with its gain as a whole. And for one experiment, with one alone."""
-    cells, spans = _Cells.of(fit, weighing), fit.problem.segment.run.spans
+    cells, spans = _Cells.of(of, weighing), of.problem.segment.run.spans
     yield from cells.all_others()
-    for way in _own_ways(fit.problem, fit.vector, cells.ways):
+    for way in _own_ways(of.problem, of.vector, cells.ways):
         yield from cells.one_other(way)
         yield from cells.one_experiment(way, spans[1:-1])  # the others have a moment at one end
+
+
+def _to_piece(problem: Problem, start: np.ndarray, first: int, last: int, weighing: Weighing) -> np.ndarray:
+    """The vector that fits the samples from ``first`` to ``last``, from ``start``, as far as a piece's may be
+    from what was known."""
+    seen = np.zeros(len(problem.segment.trust))
+    seen[first:last] = 1.0
+    masked = replace(problem.segment, trust=problem.segment.trust * seen)
+    far = replace(problem, segment=masked, nominals=replace(problem.nominals, far=True), memory={})
+    return fit(far, start, weighing, _ROUNDS).vector
 
 
 def _own_ways(problem: Problem, vector: np.ndarray, ways: np.ndarray) -> Iterator[np.ndarray]:
@@ -116,19 +151,19 @@ class _Cells:
     most: np.ndarray
 
     @classmethod
-    def of(cls, fit: Fit, weighing: Weighing) -> _Cells:
-        problem = fit.problem
+    def of(cls, of_fit: Fit, weighing: Weighing) -> _Cells:
+        problem = of_fit.problem
         low, high = problem.bounds()
-        now, ways = innovations(problem, fit.vector, weighing), np.eye(len(low))[high - low > FIXED]
-        rows = ways @ jacobian(problem, fit.vector, now, weighing, low, high)[:-1]
+        now, ways = innovations(problem, of_fit.vector, weighing), np.eye(len(low))[high - low > FIXED]
+        rows = ways @ jacobian(problem, of_fit.vector, now, weighing, low, high)[:-1]
         ends = _ends(problem, len(now))
         cells = [(rows[:, a:b], now[a:b]) for a, b in pairwise(ends)]
         normal = _summed([r @ r.T for r, _ in cells])
         ridge = ways @ _known(problem) * float(now @ now) / len(now)
         ridge = np.diag(ridge + 1e-9 * np.trace(normal[-1]))
         slope, square = _summed([r @ x for r, x in cells]), _summed([np.array(x @ x) for _, x in cells])
-        least, most = ways @ (fit.vector - high), ways @ (fit.vector - low)
-        return cls(fit, ways, ends, normal, slope, square, ridge, least, most)
+        least, most = ways @ (of_fit.vector - high), ways @ (of_fit.vector - low)
+        return cls(of_fit, ways, ends, normal, slope, square, ridge, least, most)
 
     def all_others(self) -> Iterator[Pieces]:
         """All parameters become others."""
