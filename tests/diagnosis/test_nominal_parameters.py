@@ -146,7 +146,7 @@ def test_a_refit_never_leaves_the_output_worse():
     assert found[0].nominal.vector[0] == pytest.approx(np.log(0.96), abs=0.01)
     assert alone.refitted.regulator == alone.fitted.regulator == SLOW.regulator
     whole = compose.compose(SLOW, found, gauged)
-    assert compose._gap(whole.refitted, (), gauged) <= compose._gap(SLOW, (), gauged)
+    assert compose.gap(whole.refitted, (), gauged) <= compose.gap(SLOW, (), gauged)
 
 
 def test_what_the_data_do_not_show_stays_where_it_was():

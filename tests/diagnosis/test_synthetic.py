@@ -229,7 +229,7 @@ def test_noise_that_stays_in_an_input_is_known_behind_a_stage_that_hums(monkeypa
         told.append(given[-1])
         return explain(*given)
 
-    monkeypatch.setattr("focgen.diagnosis.diagnose.explain", explained)
+    monkeypatch.setattr("focgen.diagnosis.findings.explain", explained)
     for hum in (0.0, 0.01):
         tone = [hum * np.sin(2 * np.pi * 1.3 * H * np.arange(len(log))) for log in session()]
         logs = tuple(
