@@ -59,6 +59,7 @@ def test_what_left_its_segment_is_back_where_the_output_shows_it():
     assert found.next_experiment is not None
 
 
+@pytest.mark.long
 def test_a_gauge_that_is_dropped_is_still_looked_at():
     """Its unit is off by a hundred; only that it is noisy was said."""
     logs = session(1, camera=CAMERA, drift=2e-4)
