@@ -30,9 +30,9 @@ def folds(lengths: Sequence[int]) -> np.ndarray:
 
 def fitted_to(best: Fit, weighing: Weighing, seen: np.ndarray) -> Fit:
     """A fit made anew to the samples ``seen`` (n,) only. What these do not tell stays as it was."""
-    problem, segment = best.problem, best.problem.segment
-    masked = replace(segment, trust=segment.trust * seen)
-    return settled(fit(replace(problem, segment=masked), best.vector, weighing, _ITERATIONS))
+    problem = best.problem
+    masked = replace(problem, segment=problem.segment.seen_at(seen))
+    return settled(fit(masked, best.vector, weighing, _ITERATIONS))
 
 
 def foreseen(best: Fit, weighing: Weighing) -> float:

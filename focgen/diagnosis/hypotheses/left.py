@@ -7,8 +7,6 @@ simulation is wrong for that alone, and a form that holds it at 0 for longer men
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from focgen.diagnosis.fitting.fit import Fit
@@ -39,7 +37,7 @@ def unleft(of: Fit) -> Segment | None:
         if segment.run.rest[first] == 1:
             begun = _begun(segment, left, first, last)
             seen[first : min(begun + wait, last) if begun > first else first] = 0.0
-    return None if np.all(seen) or not np.any(seen) else replace(segment, trust=segment.trust * seen)
+    return None if np.all(seen) or not np.any(seen) else segment.seen_at(seen)
 
 
 def _begun(segment: Segment, left: np.ndarray, first: int, last: int) -> int:

@@ -158,6 +158,10 @@ class Segment:
             return signal
         return signal - kernels.lag(signal, self.run.rest, self.run.h, self.pace, self.pace)
 
+    def seen_at(self, seen: np.ndarray) -> Segment:
+        """The same, of which the samples ``seen`` (n,) alone are to be trusted."""
+        return replace(self, trust=self.trust * seen)
+
     @cached_property
     def recent_share(self) -> float:
         """The part of white noise's mean square that is in its recent part."""

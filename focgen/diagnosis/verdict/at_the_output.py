@@ -33,8 +33,9 @@ def seen_at_the_output(
         whole = e if e.causes else e.whole
         if whole is None or all(c.rivals[0].off < np.log(NUMBERS.rare) for c in whole.causes):
             continue  # what changes so much is in no chain that was fitted
-        beside = (*seen[:place], whole, *seen[place + 1 :])
-        clearer = [_clearer(rig, logs, beside, place, c) for c in whole.causes]
+        each = (whole, *(_without(whole, c) for c in whole.causes))
+        there, *gone = (_output(rig, (*seen[:place], one, *seen[place + 1 :]), logs) for one in each)
+        clearer = [_clearer(logs, there, without, c) for without, c in zip(gone, whole.causes, strict=True)]
         causes = tuple(_changed(c, times) for c, times in zip(whole.causes, clearer))
         if max(clearer) > 1.0 and (e.causes or not any(holds(c.rivals[0].off) for c in causes)):
             seen[place] = replace(whole, causes=causes)
@@ -47,21 +48,21 @@ def _changed(cause: Cause, times: float) -> Cause:
     return replace(cause, rivals=rivals)
 
 
+def _without(e: Explanation, cause: Cause) -> Explanation:
+    return replace(e, best=without_family(e.best, cause.rivals[0].effect, Weighing(e.ar)))
+
+
 def _clearer(
-    rig: Rig, logs: Sequence[Experiment], explanations: Sequence[Explanation], place: int, cause: Cause
+    logs: Sequence[Experiment], there: Sequence[np.ndarray], gone: Sequence[np.ndarray], cause: Cause
 ) -> float:
-    """How many times as clearly as its own segment the output shows a cause of the explanation at a
-    ``place``."""
-    own, first = explanations[place], cause.rivals[0]
-    bare = replace(own, best=without_family(own.best, first.effect, Weighing(own.ar)))
-    without = [*explanations[:place], bare, *explanations[place + 1 :]]
-    there, gone = (_output(rig, each, logs) for each in (explanations, without))
+    """How many times as clearly as its own segment the output shows a cause, by what the chain makes of it
+    with the cause ``there`` and ``gone``."""
     left, change = 0.0, 0.0
     for log, made, other in zip(logs, there, gone, strict=True):
         read = log.read("output")
         left += float(np.sum((log["output"] - made)[read] ** 2))
         change += float(np.sum((other - made)[read] ** 2))
-    return float(np.sqrt(change / max(left, 1e-300))) / max(first.change, 1e-300)
+    return float(np.sqrt(change / max(left, 1e-300))) / max(cause.rivals[0].change, 1e-300)
 
 
 def _output(rig: Rig, explanations: Sequence[Explanation], logs: Sequence[Experiment]) -> list[np.ndarray]:

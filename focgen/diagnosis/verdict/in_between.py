@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from focgen.diagnosis.fitting.predictability import predictable_share
+from focgen.diagnosis.hypotheses.converter import rms
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.segments import make
@@ -72,15 +73,11 @@ def _heard(e: Explanation, after: Explanation) -> float:
     off = own.segment.y - own.simulate(e.best.vector)
     noise = np.concatenate([part[::-1] for part in own.segment.parts(off)])
     # as loud as it is where it was read, and forgotten where errors add up
-    level = _rms(e.best.problem.residual(e.best.vector)) * np.sqrt(max(1.0 - e.predictability.share, 0.0))
-    noise *= level / max(_rms(noise), 1e-300)
+    level = rms(e.best.problem.residual(e.best.vector)) * np.sqrt(max(1.0 - e.predictability.share, 0.0))
+    noise *= level / max(rms(noise), 1e-300)
     moved = replace(then, segment=then.segment.anew(x=then.segment.x + noise), memory={})
     answer = then.segment.recent(moved.simulate(after.best.vector) - then.simulate(after.best.vector))
-    return _rms(answer) / max(_rms(after.best.problem.residual(after.best.vector)), 1e-300)
-
-
-def _rms(signal: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(signal**2)))
+    return rms(answer) / max(rms(after.best.problem.residual(after.best.vector)), 1e-300)
 
 
 def _still_foretold(

@@ -72,8 +72,7 @@ class Pieces:
         kept = np.stack([ways[k][i] for i, k in enumerate(best)])
         square = float(np.sum(squares[best, np.arange(len(ends))]))
         if not self.together and self.square < NUMBERS.unlikely * square:
-            full = ways[0]
-            starts = [[kept[i], full[i]] if best[i] else [full[i]] for i in range(len(ends))]
+            starts = [[kept[i], ways[0][i]] if k else [kept[i]] for i, k in enumerate(best)]
             kept, square = self._fitted(starts, ends, weighing)
         return replace(self, less=kept, square=max(self.square, square))
 
@@ -83,12 +82,11 @@ class Pieces:
         """What the parameters of each piece are less where they are fitted to it, from the best of its
         ``starts``, and the sum of squares that all pieces leave."""
         problem, vector = self.of_fit.problem, self.of_fit.vector
+        low, high = _reach(problem, vector)
         less, square = [], 0.0
         for each, (first, last) in zip(starts, ends, strict=True):
-            found = [
-                np.clip(_to_piece(problem, vector - s, first, last, weighing), *_reach(problem, vector))
-                for s in each
-            ]
+            fitted = (_to_piece(problem, vector - start, first, last, weighing) for start in each)
+            found = [np.clip(to_piece, low, high) for to_piece in fitted]
             left = [float(np.sum(innovations(problem, v, weighing)[first:last] ** 2)) for v in found]
             least = int(np.argmin(left))
             less.append(vector - found[least])
@@ -119,9 +117,8 @@ def _to_piece(problem: Problem, start: np.ndarray, first: int, last: int, weighi
     from what was known."""
     seen = np.zeros(len(problem.segment.trust))
     seen[first:last] = 1.0
-    masked = replace(problem.segment, trust=problem.segment.trust * seen)
-    far = replace(problem, segment=masked, nominals=replace(problem.nominals, far=True), memory={})
-    return fit(far, start, weighing, _ROUNDS).vector
+    piece = replace(_far(problem), segment=problem.segment.seen_at(seen))
+    return fit(piece, start, weighing, _ROUNDS).vector
 
 
 def _own_ways(problem: Problem, vector: np.ndarray, ways: np.ndarray) -> Iterator[np.ndarray]:
@@ -287,11 +284,14 @@ def _ends(problem: Problem, count: int) -> np.ndarray:
     return made
 
 
+def _far(problem: Problem) -> Problem:
+    return replace(problem, nominals=replace(problem.nominals, far=True), memory={})
+
+
 def _reach(problem: Problem, vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Lower and upper bounds of what a piece is simulated with: what was known of the rig's own parameters
     holds no more behind a moment."""
-    far = replace(problem, nominals=replace(problem.nominals, far=True), memory={})
-    low, high = far.bounds()
+    low, high = _far(problem).bounds()
     own = len(problem.nominal_start)
     factors = slice(own - len(problem.nominals.factors), own)
     low[factors], high[factors] = vector[factors] - _FACTOR, vector[factors] + _FACTOR
