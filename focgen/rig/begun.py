@@ -48,12 +48,25 @@ def past_of(run: Run) -> tuple[Run, Array]:
     return told.whole, told.kept
 
 
+def standing(run: Run, stands: tuple[float, ...]) -> Run:
+    """The run whose stage that integrates stood at ``stands`` as each experiment began. Its pasts are
+    those of ``run``, and are not told anew."""
+    made = run.standing(stands)
+    if run.begins:
+        told = _told(run)
+        own = tuple(place for place, alone in zip(stands, told.alone) if alone)
+        _TOLD[made] = replace(told, whole=told.whole.standing(own))
+    return made
+
+
 @dataclass(frozen=True, eq=False)
 class _Told:
-    """A run's pasts: each with by how much of a sample its pause ends sooner, 0 where it is none; the
-    ``whole`` run with them, and where (n,) the samples of the experiments are in it."""
+    """A run's pasts: each with by how much of a sample its pause ends sooner, 0 where it is none; which
+    experiments have one of their own, ``alone``; the ``whole`` run with the pasts, and where (n,) the
+    samples of the experiments are in it."""
 
     pasts: tuple[tuple[Array, float], ...]
+    alone: tuple[bool, ...]
     whole: Run
     kept: Array
 
@@ -84,10 +97,11 @@ def _tell(run: Run) -> _Told:
         for part in (run.clock[a] - h * np.arange(len(past), 0, -1), run.clock[a:b])
     ]
     kept = [s + len(past) + np.arange(n) for s, past, n in zip(starts, pasts, lengths)]
-    stands = tuple(place for place, gap in zip(run.stands, gaps) if gap is None)
+    alone = tuple(gap is None for gap in gaps)
+    stands = tuple(place for place, own in zip(run.stands, alone) if own)
     long = replace(run, rest=rest, clock=np.concatenate(clock), begins=(), stands=stands)
     duration = max(run.duration, h * max(b - a for a, b in long.spans))
-    return _Told(tuple(zip(pasts, sooner)), replace(long, duration=duration), np.concatenate(kept))
+    return _Told(tuple(zip(pasts, sooner)), alone, replace(long, duration=duration), np.concatenate(kept))
 
 
 def _gaps(run: Run) -> list[float | None]:

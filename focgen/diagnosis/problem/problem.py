@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,10 +14,13 @@ from focgen.diagnosis.problem.excitation import excitation
 from focgen.diagnosis.problem.held import may_have_held, tells_what_is_held
 from focgen.diagnosis.problem.nominal_parameters import NominalParameters
 from focgen.diagnosis.problem.segments import Segment
+from focgen.rig.begun import standing
 from focgen.rig.effects import Effect, Excitation, Form, Parameter, Run, library
 from focgen.rig.engine import Chain
 from focgen.rig.placed import Placed, slot_in
 from focgen.rig.rig import Rig
+
+Made = TypeVar("Made")
 
 ZERO = 0.03  # of the level: what a zero is off by that nothing shows alone
 _ALIGNED = 0.5  # of the slack of columns: what a standard deviation is; a delay is to be called one
@@ -252,16 +255,8 @@ class Problem:
     def rig(self, vector: np.ndarray) -> Rig:
         """The rig with the vector's nominal parameters; the same object where they are as lately: making one
         takes as long as running a stage."""
-        values = vector[: len(self.nominal_start)]
-        kept: list[tuple[bytes, Rig, Rig]] = self.memory.setdefault("rigs", [])
-        key = values.tobytes()
-        for old, given, rig in kept:
-            if old == key and given is self.nominals.rig:
-                return rig
-        rig = self.nominals.put(self.nominals.rig, values)
-        kept.insert(0, (key, self.nominals.rig, rig))
-        del kept[2:]
-        return rig
+        values, given = vector[: len(self.nominal_start)], self.nominals.rig
+        return self._lately("rigs", values.tobytes(), given, partial(self.nominals.put, given, values))
 
     def placed(self, vector: np.ndarray) -> tuple[Placed, ...]:
         """The candidate effects as effects of a chain."""
@@ -287,14 +282,21 @@ class Problem:
         self, what: str, numbers: np.ndarray, of: Callable[[np.ndarray], np.ndarray], probe: bool
     ) -> np.ndarray:
         """What these ``numbers`` make, as it was where they are as lately: most others move without them."""
-        kept: tuple[bytes, np.ndarray] = self.memory.get(what, (b"", numbers))
-        key, (old, made) = numbers.tobytes(), kept
-        if old == key:
-            return made
-        new = of(numbers)
+        return self._lately(what, numbers.tobytes(), None, partial(of, numbers), probe)
+
+    def _lately(
+        self, what: str, key: Hashable, of: object, make: Callable[[], Made], probe: bool = False
+    ) -> Made:
+        """What was made of the same ``key`` and the same object lately, or is now."""
+        kept: list[tuple[Hashable, object, Made]] = self.memory.setdefault(what, [])
+        for old, whose, made in kept:
+            if whose is of and old == key:
+                return made
+        made = make()
         if not probe:
-            self.memory[what] = key, new
-        return new
+            kept.insert(0, (key, of, made))
+            del kept[2:]
+        return made
 
     def _parted(self, nuisances: np.ndarray) -> tuple[np.ndarray, ...]:
         """The nuisances behind the alignment: of gauges, of the input's ways, of begins, of zeros, and of
@@ -309,9 +311,13 @@ class Problem:
         return tuple(pairwise(ends.tolist()))
 
     def _begun(self, stood: np.ndarray) -> Run:
-        """The run, with what a pump held as each experiment began off by so many standard deviations."""
+        """The run, with what a pump held as each experiment began off by so many standard deviations; the
+        same object where that is as lately, by which its pasts are told once."""
         run = self.segment.fed.run
-        return replace(run, stands=self._held(stood)) if stood.any() else run
+        if not stood.any():
+            return run
+        begun = partial(standing, run, self._held(stood))
+        return self._lately("stood", stood.tobytes(), run, begun)
 
     def zero(self, vector: np.ndarray) -> float:
         """What the output reads where nothing moves, in the log's unit; 0 where the rig has an offset."""
@@ -357,16 +363,10 @@ class Problem:
         key = (shift, *off.tolist())
         if not any(key):
             return self.segment.fed.bent
-        kept: list[tuple[tuple[float, ...], np.ndarray]] = self.memory.setdefault("entered", [])
-        for old, y in kept:
-            if old == key:
-                return y
-        if probe:
-            return self._beside(kept[0], key) if kept else self._moved(shift, off)
-        made = self._moved(shift, off)
-        kept.insert(0, (key, made))
-        del kept[2:]
-        return made
+        make, near = partial(self._moved, shift, off), self.memory.get("entered")
+        if probe and near:
+            make = partial(self._beside, near[0], key)
+        return self._lately("entered", key, None, make, probe)
 
     def _moved(self, shift: float, off: np.ndarray) -> np.ndarray:
         fed = self.segment.fed
@@ -374,10 +374,10 @@ class Problem:
         x = x + abs(shift) * fed.moves[shift < 0] if shift else x
         return x + fed.input_modes @ off if off.any() else x
 
-    def _beside(self, near: tuple[tuple[float, ...], np.ndarray], key: tuple[float, ...]) -> np.ndarray:
+    def _beside(self, near: tuple[tuple[float, ...], None, np.ndarray], key: tuple[float, ...]) -> np.ndarray:
         """The same from what it is ``near``, where but one number is another: a way alone is quicker than
         all."""
-        (old, made), others = near, [i for i, v in enumerate(key) if v != near[0][i]]
+        (old, _, made), others = near, [i for i, v in enumerate(key) if v != near[0][i]]
         if len(others) > 1 or (0 in others and old[0] * key[0] <= 0.0):
             return self._moved(key[0], np.array(key[1:]))
         for i in others:

@@ -105,6 +105,17 @@ class Run:
         rest[later[rest[later] == 1]] = 0
         return replace(self, rest=rest)
 
+    def standing(self, stands: tuple[float, ...]) -> Run:
+        """The run whose stage that integrates stood at ``stands`` as each experiment began."""
+        return self._resting(self.rest, stands)
+
+    def _resting(self, rest: Bytes, stands: tuple[float, ...]) -> Run:
+        """The run of the same experiments, each resting as ``rest`` (n,) says. Where they begin is not looked
+        for anew: that takes as long as running a stage."""
+        made = replace(self, rest=rest, stands=stands)
+        vars(made)["spans"] = self.spans
+        return made
+
     def held(self, x: Array) -> Run:
         """The run behind what remembers, whose input is ``x`` (n,): a later experiment that begins with an
         input of 0 begins in equilibrium with what that makes of it."""
@@ -126,7 +137,7 @@ class Run:
         rest = self.rest.copy()
         firsts = np.flatnonzero(rest)
         rest[firsts[np.array(self.stands) != 0.0]] = 2
-        return replace(self, rest=rest, stands=())
+        return self._resting(rest, stands=())
 
     def lying(self, x: Array, level: float) -> Run:
         """The run behind what rests at a ``level`` of its own: an experiment in which its output ``x`` (n,)
@@ -137,7 +148,7 @@ class Run:
         """The run in equilibrium wherever a signal ``x`` (n,) is at a ``level`` at one of ``firsts``."""
         rest, still = self.rest.copy(), _STILL * max(float(x.max(initial=0.0)), -float(x.min(initial=0.0)))
         rest[firsts[np.abs(x[firsts] - level) <= still]] = 2
-        return replace(self, rest=rest)
+        return self._resting(rest, self.stands)
 
     @property
     def stood_by_span(self) -> list[tuple[int, int, float]]:
