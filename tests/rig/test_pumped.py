@@ -220,6 +220,22 @@ def test_a_spindle_lies_in_its_gap_as_the_log_before_left_it(lasts):
     np.testing.assert_allclose(made[[29, 30, 59]], [stroke - 0.4, 2.6, 2.6 - (stroke - 0.8)], atol=0.02)
 
 
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_spindle_lies_as_what_moved_the_piston_between_two_logs_left_it(way):
+    """The piston was brought back between two logs, from above or from below: the next stroke that way
+    moves it at once, and the gap takes from one the other way. Red when the spindle is taken to lie where
+    the log before left it, whatever has happened since."""
+    pump = replace(RIGS["whole"], regulator=TransferFunction([(1.0, 0.0)], [(1.0, 1.0)]))
+    stroke = np.r_[np.zeros(5), np.full(20, 3.0), np.zeros(5)]
+    run = Run.of([30, 30, 30], [0.0, 90 * H, 180 * H], H, stands=[0.0, way * 20.0, -way * 20.0])
+    lost = placed("valve_stiction", "lost_motion", 0.4)
+    flow = np.r_[stroke, way * stroke, way * stroke]
+    made = Chain(pump, (lost,)).run(flow, "regulator", "regulator", run)
+    whole = way * 20 * H * 3.0
+    expected = [way * 20.0, way * 20.0 + whole, -way * 20.0, -way * 20.0 + whole - way * 0.8]
+    np.testing.assert_allclose(made[[30, 59, 60, 89]], expected, atol=0.02)
+
+
 def test_a_volume_is_told_through_a_curve():
     """Red when what a pump held is told as if the actuator did not bend what it makes of it."""
     rig, curve = RIGS["whole"], placed("gain_nonlinearity", "force_factor", 0.5, 0.0, 12.0, stage="actuator")

@@ -31,12 +31,17 @@ def _play(x: Array, values: Values, run: Run) -> Array:
 
 
 def _lost_motion(x: Array, values: Values, run: Run) -> Array:
-    """A pump's piston, whose spindle lies in its gap as the log before left it."""
-    made, free = np.empty(len(x)), 0.0
-    for a, b in run.spans:
-        spindle = x[a:b] - x[a] - free
-        piston = kernels.play(spindle, run.rest[a:b], values[0])
-        made[a:b], free = x[a] + piston, piston[-1] - spindle[-1]
+    """A pump's piston, whose spindle lies in its gap as the log before left it; or, where the piston stands
+    elsewhere by now, as what has moved it there did, which the spindle is ahead of."""
+    (band,), made = values, np.empty(len(x))
+    behind, ended = 0.0, None  # what the piston is behind its spindle; where it was as the log before ended
+    for a, b, stood in run.stood_by_span:
+        moved = 0.0 if ended is None else stood + x[a] - ended
+        behind = min(max(behind + moved, -band), band)
+        spindle = x[a:b] - x[a] + behind
+        piston = kernels.play(spindle, run.rest[a:b], band)
+        made[a:b], behind = x[a] + piston, spindle[-1] - piston[-1]
+        ended = stood + made[b - 1]
     return made
 
 
