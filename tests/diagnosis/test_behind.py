@@ -94,7 +94,8 @@ def test_what_is_behind_the_dynamics_is_whose_the_curvature_shows(of, effect, se
     assert cause.candidates[0].form.endswith("_behind") == (of == "actuator")
 
 
-@pytest.mark.parametrize("of, effect, seed", CASES)
+@pytest.mark.long
+@pytest.mark.parametrize("of, effect, seed", [case.values for case in CASES])
 def test_without_the_curvature_it_is_either_s(of, effect, seed):
     found = diagnose(RIG, [without_curvature(log) for log in logs(seed, of, effect)], pictures=False)
     (cause,) = found.causes

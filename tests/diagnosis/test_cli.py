@@ -114,7 +114,7 @@ def test_the_controller_departs_by_what_was_done_to_it(tmp_path, capsys, effect)
     _write(tmp_path, "0001", case, "")
     folder = tmp_path / "cases" / "0001"
     given = [str(folder / "rig.toml"), *map(str, sorted((folder / "logs").iterdir()))]
-    ending = ["--controller", str(folder / "controller.toml"), "--out", str(tmp_path / "out")]
+    ending = ["--controller", str(folder / "controller.toml"), "--out", str(tmp_path / "out"), "--to", "30"]
     assert main(["diagnose", *given, *ending]) == 0
     said = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
     assert said["verdict"] == "named"

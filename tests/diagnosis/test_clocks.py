@@ -50,7 +50,12 @@ def test_columns_of_two_loggers_are_no_drift(rate, roles, seed):
 
 
 @pytest.mark.parametrize(
-    "effect", [pytest.param({"drift": 4e-4}, marks=pytest.mark.long), {"vent": 0.8}, {"delay": 6}]
+    "effect",
+    [
+        pytest.param({"drift": 4e-4}, marks=pytest.mark.long),
+        pytest.param({"vent": 0.8}, marks=pytest.mark.long),
+        {"delay": 6},
+    ],
 )
 def test_what_lies_in_the_rig_is_not_taken_for_it(effect):
     found = diagnose(RIG, session(5, roles=("pressure",), **effect), pictures=False)

@@ -67,7 +67,16 @@ def test_neither_does_one_that_began_with_its_first_error():
 
 
 @pytest.mark.parametrize("begins", [False, True])
-@pytest.mark.parametrize("length", [20, 50, 100, 137, 600])
+@pytest.mark.parametrize(
+    "length",
+    [
+        20,
+        pytest.param(50, marks=pytest.mark.long),
+        pytest.param(100, marks=pytest.mark.long),
+        pytest.param(137, marks=pytest.mark.long),
+        pytest.param(600, marks=pytest.mark.long),
+    ],
+)
 def test_short_memory(length, begins):
     ref, meas = inputs()
     ref = ref + 0.003
@@ -95,7 +104,9 @@ def test_a_memory_that_outlasts_most_of_the_log_is_an_infinite_one():
     assert not check_controller(stated, [log_of(u, ref, meas)]).causes
 
 
-@pytest.mark.parametrize("length", [20, 50, 137])
+@pytest.mark.parametrize(
+    "length", [20, pytest.param(50, marks=pytest.mark.long), pytest.param(137, marks=pytest.mark.long)]
+)
 def test_what_the_file_says_itself_is_no_departure(length):
     """A stated memory, a longer one than stated, and stated arithmetic; a shorter one than stated is one."""
     ref, meas = inputs()
@@ -148,14 +159,16 @@ def in_whole_numbers(ref, meas, bits, down):
 
 
 @pytest.mark.parametrize("down", [False, True])
-@pytest.mark.parametrize("bits", [10, 12, 14])
+@pytest.mark.parametrize(
+    "bits", [10, pytest.param(12, marks=pytest.mark.long), pytest.param(14, marks=pytest.mark.long)]
+)
 def test_words_of_other_lengths(bits, down):
     ref, meas = inputs()
     found = check_controller(CONTROLLER, [log_of(in_whole_numbers(ref, meas, bits, down), ref, meas)])
     assert effects(found) == [["fixed_point"]] and abs(found.causes[0][0].value - bits) <= 1
 
 
-@pytest.mark.parametrize("told", [False, True])
+@pytest.mark.parametrize("told", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_output_saturation(told):
     limit = 0.6 * command()[0].max()
     tight = replace(CONTROLLER, ranges=replace(CONTROLLER.ranges, output=(0.0, limit)))
@@ -243,7 +256,10 @@ def test_counts_of_the_log_are_not_the_controllers():
     assert count_of([np.zeros(100)]) is None
 
 
-@pytest.mark.parametrize("change, large", [({"gain": 80.0}, False), ({"integrator": False}, True)])
+@pytest.mark.parametrize(
+    "change, large",
+    [({"gain": 80.0}, False), pytest.param({"integrator": False}, True, marks=pytest.mark.long)],
+)
 def test_another_controller_than_the_files_is_said_to_be_one(change, large):
     """No memory, arithmetic or limit of the file's controller makes these commands."""
     found = check_controller(CONTROLLER, [log_of(*command(replace(CONTROLLER, **change)))])

@@ -112,6 +112,7 @@ def test_rests_of_a_rig_that_answers_within_a_sample_are_no_steps():
     assert "sensor_quantization" not in [c.candidates[0].effect for c in found.causes]
 
 
+@pytest.mark.long
 def test_levels_of_a_finer_converter_behind_are_steps(monkeypatch):
     """Each level is read as its nearest of 4096, so that none is where even steps would have it. That they
     are steps needs no model that comes closer by them."""
@@ -127,7 +128,10 @@ def test_levels_of_a_finer_converter_behind_are_steps(monkeypatch):
     assert [c.candidates[0].effect for c in found.causes] == ["sensor_quantization"]
 
 
-@pytest.mark.parametrize("noise, seed", [(0.6, 5), pytest.param(0.6, 6, marks=pytest.mark.long), (0.1, 5)])
+@pytest.mark.parametrize(
+    "noise, seed",
+    [(0.6, 5), pytest.param(0.6, 6, marks=pytest.mark.long), pytest.param(0.1, 5, marks=pytest.mark.long)],
+)
 def test_steps_are_a_cause_where_they_make_most_of_the_noise(noise, seed):
     """Every converter has steps. Readings of a healthy rig whose noise is 0.6 of a step were named coarse at
     96 %, and 0 % of the gap."""
@@ -150,7 +154,7 @@ def test_nothing_is_held_against_steps_that_the_best_fit_goes_without():
     assert bases.__wrapped__(bare) == (nothing,)
 
 
-@pytest.mark.parametrize("dead", [3.0, 0.0])
+@pytest.mark.parametrize("dead", [3.0, pytest.param(0.0, marks=pytest.mark.long)])
 def test_steps_that_are_noise_beside_an_effect_are_no_second_one(dead):
     """A pump that does nothing below 3 V, read in steps of 0.5 of 24."""
     t = np.arange(840) * H
@@ -210,7 +214,8 @@ def rubbed(force: np.ndarray, rub: float) -> np.ndarray:
     return np.array(found)
 
 
-@pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [3, 4])
 def test_steps_that_are_noise_hide_no_friction(seed):
     """The friction moves the reading by half a step, of twice the noise. It was seen, and was unknown."""
     rng, step = np.random.default_rng(seed), 0.1
@@ -291,6 +296,7 @@ def test_steps_that_go_on_late_are_no_loop_beside_them(part, lag, seed, tmp_path
     assert left == pytest.approx(found.gap.explained, rel=0.02)
 
 
+@pytest.mark.long
 def test_a_loop_that_is_taken_for_granted_stays():
     told = ("sensor_hysteresis", "sensor_quantization")
     found = diagnose(FINGER, read_late(0.05, 0.3, 2), only=told, pictures=False)
@@ -331,9 +337,14 @@ def slower_down(step: float, down: float, uneven: float, seed: int) -> list[Expe
     return logs
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "down, uneven, named",
-    [(1.4, 0.0, ["unloading_asymmetry"]), (1.8, 0.1, ["unloading_asymmetry"]), (0.8, 0.0, [])],
+    [
+        (1.4, 0.0, ["unloading_asymmetry"]),
+        (1.8, 0.1, ["unloading_asymmetry"]),
+        (0.8, 0.0, []),
+    ],
 )
 def test_what_moves_levels_by_whole_steps_is_seen_though_no_input_predicts_much_of_it(down, uneven, named):
     """What is left at a sixth of the span is whole steps, late or soon: of that inputs predict 5 to 9 in a

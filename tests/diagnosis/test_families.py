@@ -54,7 +54,7 @@ def test_an_effect_is_left_out_of_the_best_that_is_known_without_it():
     assert found.sse == pytest.approx(known.sse, rel=1e-3) and found.problem.candidates == (first,)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(s, marks=pytest.mark.long) for s in range(1, 4))])
 def test_what_stays_is_fitted_to_its_least_wherever_the_effect_had_taken_it(seed):
     """A fit that is stopped on its way leaves more, and what was left out seems to explain that."""
     logs = session(4, noise=0.004)
@@ -154,13 +154,16 @@ def driven(*den: tuple[float, float]) -> Rig:
     return replace(MOTOR, regulator=drive, signals=Signals("t", "w", "u", pressure="p"))
 
 
+@pytest.mark.long
 def test_a_limit_that_is_rounded_either_way_is_no_bent_gain():
     (cause,) = diagnose(driven((0.12, 1.0)), powered((0.12, 1.0), 1.8), pictures=False).causes
     first = cause.candidates[0]
     assert (first.effect, first.form) == ("supply_saturation", "soft_both_ways") and first.confidence > 0.9
 
 
-@pytest.mark.parametrize("damping", [0.85, 0.9, 1.1])
+@pytest.mark.parametrize(
+    "damping", [0.85, pytest.param(0.9, marks=pytest.mark.long), pytest.param(1.1, marks=pytest.mark.long)]
+)
 def test_a_damping_a_tenth_off_is_no_effect(damping):
     """What gives a regulator's bandwidth gives its damping no better."""
     rig = driven((0.01, 2.0), (0.12 * damping, 1.0))

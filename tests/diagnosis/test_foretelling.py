@@ -58,7 +58,7 @@ def families(of: Fit) -> list[str]:
     return [c.effect for c in of.problem.candidates]
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(s, marks=pytest.mark.long) for s in range(2, 4))])
 def test_what_two_runs_tell_differently_is_left_out(seed):
     """The first step to 6 V ends lower, as at an obstacle, and the second one does not."""
     logs = steps(seed, 6.0, 6.0, 6.0, 4.8, 6.0)
@@ -79,7 +79,7 @@ def dead_and_creeping(seed: int) -> Fit:
     return fitted(replace(problem, segment=seen, memory={}))
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(s, marks=pytest.mark.long) for s in range(1, 4))])
 def test_two_effects_that_are_there_stay(seed):
     assert families(foretelling(dead_and_creeping(seed), WHITE)) == ["dead_zone", "creep"]
 
@@ -104,7 +104,7 @@ def test_parts_are_neighbouring_experiments_or_quarters():
     assert folds([8]).tolist() == [0, 0, 1, 1, 2, 2, 3, 3]
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(s, marks=pytest.mark.long) for s in range(1, 3))])
 def test_a_fit_foretells_what_it_made_least(seed):
     """Noise that wanders leaves a level of each run that no other run tells. Its innovations do not."""
     logs = steps(seed, 6.0, 6.0, 6.0, 6.0, 6.0)

@@ -46,8 +46,8 @@ def log(kind, rng, coloured, role="command", fault=lambda u: u, count=1400, star
     return Experiment(kind, H, {role: u, "output": y}, start)
 
 
-@pytest.mark.parametrize("role", ["command", "pressure"])
-@pytest.mark.parametrize("kind", ["steps", "sine", "multisine"])
+@pytest.mark.parametrize("role", ["command", pytest.param("pressure", marks=pytest.mark.long)])
+@pytest.mark.parametrize("kind", ["steps", pytest.param("sine", marks=pytest.mark.long), "multisine"])
 @pytest.mark.parametrize("coloured", [False, True])
 def test_a_healthy_one_is_healthy(kind, coloured, role):
     """Of 16 such logs three with a colour were ``unknown``: the rig was judged by what it does within less
@@ -61,10 +61,14 @@ def test_a_healthy_one_is_healthy(kind, coloured, role):
 @pytest.mark.parametrize(
     "fault, names",
     [
-        (lambda u: np.sign(u) * np.maximum(np.abs(u) - 0.1, 0.0), {"dead_zone", "friction"}),
-        (lambda u: np.r_[np.zeros(8), u[:-8]], {"transport_delay"}),
+        pytest.param(
+            lambda u: np.sign(u) * np.maximum(np.abs(u) - 0.1, 0.0),
+            {"dead_zone", "friction"},
+            marks=pytest.mark.long,
+        ),
+        pytest.param(lambda u: np.r_[np.zeros(8), u[:-8]], {"transport_delay"}, marks=pytest.mark.long),
         (lambda u: np.clip(u, -0.75, 0.75), {"supply_saturation"}),
-        (lambda u: u * (1.0 + 0.15 * u * u), {"gain_nonlinearity"}),
+        pytest.param(lambda u: u * (1.0 + 0.15 * u * u), {"gain_nonlinearity"}, marks=pytest.mark.long),
     ],
 )
 def test_what_its_whole_path_shows_is_named(fault, names):

@@ -41,7 +41,13 @@ def session(seed: int, load: float = 0.0, mass: float = 0.0, zero: float = 0.0, 
 
 
 @pytest.mark.parametrize(
-    "change", [{"zero": 0.8}, {"load": 0.8}, {"mass": 0.4}], ids=["a zero", "a load", "a mass"]
+    "change",
+    [
+        pytest.param({"zero": 0.8}, marks=pytest.mark.long),
+        {"load": 0.8},
+        pytest.param({"mass": 0.4}, marks=pytest.mark.long),
+    ],
+    ids=["a zero", "a load", "a mass"],
 )
 def test_what_changes_at_once_is_unknown_and_it_is_said_when(change):
     told = None if "mass" in change else ("sensor_drift", "gain_drift")  # all families take ten times as long
@@ -55,7 +61,7 @@ def test_what_changes_at_once_is_unknown_and_it_is_said_when(change):
     assert any("at once" in note for note in found.notes)
 
 
-@pytest.mark.parametrize("drift", [0.8, 0.3])
+@pytest.mark.parametrize("drift", [pytest.param(0.8, marks=pytest.mark.long), 0.3])
 def test_a_slow_drift_is_a_drift(drift):
     found = diagnose(BENCH, session(4, drift=drift), only=("sensor_drift", "gain_drift"))
     assert [c.candidates[0].effect for c in found.causes] == ["sensor_drift"]

@@ -48,10 +48,10 @@ def named(diagnosis):
     "off, roles",
     [
         ({"sensor": (1.03, 1.0)}, BOTH),
-        ({"regulator": (0.97, 1.0)}, BOTH),
-        ({"regulator": (1.0, 1.1)}, BOTH),
-        ({"sensor": (1.0, 0.8)}, BOTH),
-        ({"regulator": (1.02, 1.15), "sensor": (0.98, 0.85)}, PRESSURE),
+        pytest.param({"regulator": (0.97, 1.0)}, BOTH, marks=pytest.mark.long),
+        pytest.param({"regulator": (1.0, 1.1)}, BOTH, marks=pytest.mark.long),
+        pytest.param({"sensor": (1.0, 0.8)}, BOTH, marks=pytest.mark.long),
+        pytest.param({"regulator": (1.02, 1.15), "sensor": (0.98, 0.85)}, PRESSURE, marks=pytest.mark.long),
         ({"regulator": (1.02, 1.15), "sensor": (0.98, 0.85)}, NEITHER),
     ],
     ids=str,
@@ -62,7 +62,10 @@ def test_what_was_given_a_little_off_is_no_fault(off, roles):
     assert found.gap.refitted < found.gap.as_given
 
 
-@pytest.mark.parametrize("roles", [BOTH, PRESSURE, NEITHER])
+@pytest.mark.parametrize(
+    "roles",
+    [pytest.param(BOTH, marks=pytest.mark.long), pytest.param(PRESSURE, marks=pytest.mark.long), NEITHER],
+)
 def test_an_exact_rig_has_no_gap(roles):
     assert diagnose(SLOW, logs(roles=roles)).verdict == "none"
 
@@ -70,8 +73,8 @@ def test_an_exact_rig_has_no_gap(roles):
 @pytest.mark.parametrize(
     "off, effect",
     [
-        ({"regulator": (1.0, 1.6)}, "slow_regulator"),
-        ({"sensor": (1.0, 2.5)}, "sensor_lag"),
+        pytest.param({"regulator": (1.0, 1.6)}, "slow_regulator", marks=pytest.mark.long),
+        pytest.param({"sensor": (1.0, 2.5)}, "sensor_lag", marks=pytest.mark.long),
         ({"regulator": (0.88, 1.0)}, "leak"),
     ],
     ids=str,
@@ -85,8 +88,8 @@ def test_what_is_slower_or_lower_than_is_usual_is_named(off, effect):
     "off, words",
     [
         ({"regulator": (1.0, 0.5)}, "regulator's times"),
-        ({"regulator": (1.15, 1.0)}, "regulator's gain"),
-        ({"sensor": (0.85, 1.0)}, "sensor's gain"),
+        pytest.param({"regulator": (1.15, 1.0)}, "regulator's gain", marks=pytest.mark.long),
+        pytest.param({"sensor": (0.85, 1.0)}, "sensor's gain", marks=pytest.mark.long),
     ],
     ids=str,
 )
@@ -189,6 +192,7 @@ def test_the_note_of_a_factor_is_the_factor():
     assert far_moves(rig, own.put(rig, np.log([1.05, 0.8]))) == ()
 
 
+@pytest.mark.long
 def test_beside_a_number_that_was_moved_far_no_name_is_sure(monkeypatch):
     """Either that number or the name is wrong; what is taken for granted is there all the same."""
     logs, line = session(11, vent=0.5), "the refit moves the sensor's gain"
@@ -236,7 +240,14 @@ def test_beside_an_actuator_that_has_a_gain_there_is_no_other():
     assert [(f.stage, f.kind) for f in found] == [("sensor", "time")]
 
 
-@pytest.mark.parametrize("stage", ["regulator", "actuator", "sensor"])
+@pytest.mark.parametrize(
+    "stage",
+    [
+        "regulator",
+        pytest.param("actuator", marks=pytest.mark.long),
+        pytest.param("sensor", marks=pytest.mark.long),
+    ],
+)
 def test_a_dead_time_is_found_in_every_stage_and_as_long_as_it_is(stage):
     rig = replace(SLOW, delays=Delays(**{stage: 0.35}))
     found = diagnose(SLOW, delayed(rig))
@@ -299,6 +310,7 @@ def test_what_is_known_exactly_of_an_actuator_is_held_and_strains_nothing():
         assert not own.strained(start)
 
 
+@pytest.mark.long
 def test_a_gauge_far_off_beside_an_effect_is_said_and_left_to_no_effect():
     """The sensor's filter is three times as slow, and its gain a tenth low: no effect stands for that."""
     logs = [log.between(0.0, 40.0) for log in session(7, sensor=(0.9, 0.5))[:3]]
@@ -308,7 +320,11 @@ def test_a_gauge_far_off_beside_an_effect_is_said_and_left_to_no_effect():
     assert found.shrink > 0.9
 
 
-@pytest.mark.parametrize("bend, sure, said", [(12.0, (0.5, 0.9), True), (18.0, (0.9, 1.0), False)])
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "bend, sure, said",
+    [(12.0, (0.5, 0.9), True), (18.0, (0.9, 1.0), False)],
+)
 def test_a_bend_as_large_as_the_noise_may_be_the_nominal_curves_own(bend, sure, said):
     """Both are seen clearly in these samples; the smaller is as much as an identified curve may be off by."""
     found = diagnose(RIG, session(3, bend=bend))

@@ -89,7 +89,9 @@ def found(folder, logs):
     return diagnose(RIG, files, pictures=False)
 
 
-@pytest.mark.parametrize("nuisance", (coloured, rezeroed), ids=lambda n: n.__name__)
+@pytest.mark.parametrize(
+    "nuisance", (coloured, pytest.param(rezeroed, marks=pytest.mark.long)), ids=lambda n: n.__name__
+)
 def test_what_every_bench_has_is_no_fault(nuisance, tmp_path):
     assert found(tmp_path, spoilt(nuisance, 1)).verdict in ("none", "parameters")
 

@@ -45,7 +45,10 @@ def session(ahead: float = np.inf, behind: float = np.inf) -> list[Experiment]:
 
 @pytest.mark.parametrize(
     "where, effect",
-    [({"ahead": 9.0}, "supply_saturation"), ({"behind": 18.0}, "sensor_saturation")],
+    [
+        pytest.param({"ahead": 9.0}, "supply_saturation", marks=pytest.mark.long),
+        ({"behind": 18.0}, "sensor_saturation"),
+    ],
     ids=["clipped drive", "stopped reading"],
 )
 def test_a_limit_is_found_on_its_side_of_the_dynamics(where, effect):
@@ -66,7 +69,10 @@ def test_a_gauge_behind_the_only_stage_given_has_effects_of_its_own():
     assert cause.stage == "sensor" and cause.candidates[0].effect == "sensor_nonlinearity"
 
 
-@pytest.mark.parametrize("where, effect", [("ahead", "slow_regulator"), ("behind", "sensor_lag")])
+@pytest.mark.parametrize(
+    "where, effect",
+    [("ahead", "slow_regulator"), pytest.param("behind", "sensor_lag", marks=pytest.mark.long)],
+)
 def test_a_lag_is_found_on_its_side_of_a_bent_gain(where, effect):
     """T y' + y = 2 u², and a lag of a fifth of T ahead of the square or behind everything."""
     film = Rig("film", H, Signals("t", "y", "u"), Actuator(1.05 * T, 1.0, (0.0, 1.9)))

@@ -41,8 +41,8 @@ def session(seed, most=np.inf, back=1.0, gap=0.0):
 @pytest.mark.parametrize(
     "fault, effect, size",
     [
-        ({"most": 5.0}, "flow_limit", 5.0),
-        ({"back": 0.9}, "valve_asymmetry", 0.9),
+        pytest.param({"most": 5.0}, "flow_limit", 5.0, marks=pytest.mark.long),
+        pytest.param({"back": 0.9}, "valve_asymmetry", 0.9, marks=pytest.mark.long),
         ({"gap": 0.4}, "valve_stiction", 0.4),
     ],
 )
@@ -55,7 +55,7 @@ def test_what_a_pump_does_not_move_is_named(fault, effect, size):
     assert next(iter(first.parameters.values())).value == pytest.approx(size, rel=0.1)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_a_pump_that_moves_all_of_it_is_healthy(seed):
     assert diagnose(RIG, session(seed), pictures=False).verdict in ("none", "parameters")
 
@@ -70,7 +70,7 @@ def test_what_a_pump_held_may_be_off_unless_it_was_empty_and_at_rest():
     assert may_have_held(Run.of([5], [0.0], H)) == (False,)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [pytest.param(1, marks=pytest.mark.long), 2])
 def test_what_a_pump_held_on_its_way_is_in_the_rig_that_is_found(seed):
     """Both logs begin within a stroke, and no volume is logged. What begins shift for good was in the fit
     alone: a finger's rig that was found left 5 to 30 times the noise."""

@@ -89,6 +89,7 @@ def names(diagnosis):
     return [{c.effect for c in f.candidates} for f in diagnosis.causes]
 
 
+@pytest.mark.long
 def test_hair_dryer_has_a_transport_delay(tmp_path):
     rig, log = rig_and_log("dryer", tmp_path)
     rows = np.genfromtxt(

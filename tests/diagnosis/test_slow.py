@@ -51,7 +51,11 @@ def with_own_clocks(logs):
 
 @pytest.mark.parametrize(
     ("seed", "share", "slow", "clocks"),
-    [(1, 0.68, 135.0, list), (3, 0.4, 60.0, list), (1, 0.68, 135.0, with_own_clocks)],
+    [
+        pytest.param(1, 0.68, 135.0, list, marks=pytest.mark.long),
+        (3, 0.4, 60.0, list),
+        pytest.param(1, 0.68, 135.0, with_own_clocks, marks=pytest.mark.long),
+    ],
 )
 def test_a_creep_slower_than_the_logs_is_no_drift(seed, share, slow, clocks):
     found = diagnose(RIG, clocks(session(seed, share, slow)), pictures=False)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from scipy.integrate import solve_ivp
 
 from focgen.diagnosis.diagnose import diagnose
@@ -50,8 +51,9 @@ def session() -> list[Experiment]:
     return logs
 
 
-def test_stops_at_both_ends_are_an_obstacle():
-    found = diagnose(COIL, session())
+@pytest.mark.parametrize("count", [1, pytest.param(2, marks=pytest.mark.long)])
+def test_stops_at_both_ends_are_an_obstacle(count):
+    found = diagnose(COIL, session()[:count])
     (cause,) = found.causes
     assert cause.candidates[0].effect == "contact" and cause.candidates[0].form == "both_ways"
     assert found.shrink is not None and found.shrink > 0.8

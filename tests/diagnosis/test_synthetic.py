@@ -55,10 +55,10 @@ def test_parameters_only(seed):
     "effect, stage, case",
     [
         ("transport_delay", "regulator", {"delay": 4}),
-        ("valve_asymmetry", "regulator", {"vent": 0.8}),
-        ("dead_zone", "actuator", {"zone": 0.045}),
-        ("hysteresis", "actuator", {"slip": 0.35}),
-        ("sensor_nonlinearity", "sensor", {"bend": 20.0}),
+        pytest.param("valve_asymmetry", "regulator", {"vent": 0.8}, marks=pytest.mark.long),
+        pytest.param("dead_zone", "actuator", {"zone": 0.045}, marks=pytest.mark.long),
+        pytest.param("hysteresis", "actuator", {"slip": 0.35}, marks=pytest.mark.long),
+        pytest.param("sensor_nonlinearity", "sensor", {"bend": 20.0}, marks=pytest.mark.long),
     ],
 )
 def test_one_effect_is_named_in_its_stage(effect, stage, case):
@@ -114,12 +114,13 @@ def test_what_inputs_still_tell_of_a_pressure_goes_on_into_the_stage_behind():
     assert NUMBERS.chance < told < NUMBERS.left and after < (1.0 - 0.9 * told) * before
 
 
+@pytest.mark.long
 def test_a_fault_of_the_sensor_behind_a_noisy_camera_is_found():
     found = diagnose(RIG, session(1, camera=5.0, noise=0.003, bend=20.0))
     assert named(found) == [["sensor_nonlinearity"]] and found.shrink > 0.8
 
 
-@pytest.mark.parametrize("role", ["pressure", "curvature"])
+@pytest.mark.parametrize("role", ["pressure", pytest.param("curvature", marks=pytest.mark.long)])
 @pytest.mark.parametrize("off", [0.03, pytest.param(0.008, marks=pytest.mark.long)])
 def test_gauges_that_disagree_by_a_little_are_no_fault(role, off):
     logs = [replace(log, signals={**log.signals, role: log[role] * (1 + off)}) for log in session(1, T=1.45)]
@@ -127,7 +128,7 @@ def test_gauges_that_disagree_by_a_little_are_no_fault(role, off):
     assert found.verdict == "parameters" and not found.causes
 
 
-@pytest.mark.parametrize("off, fault", [(0.008, False), (0.03, True)])
+@pytest.mark.parametrize("off, fault", [(0.008, False), pytest.param(0.03, True, marks=pytest.mark.long)])
 def test_gauges_of_a_stage_that_is_absent_agree_to_a_percent(off, fault):
     """Without a sensor the rig says that the output is the curvature; another camera reads it."""
     bare = replace(RIG, sensor=UNITY)
@@ -262,6 +263,7 @@ def test_of_a_promise_of_next_to_nothing_segments_that_close_their_own_gap_are_n
     assert found(clear, path) == [path]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("share, causes", [(0.9, [["valve_asymmetry"]]), (0.1, [])])
 def test_what_is_clear_in_one_segment_stands_whatever_is_left_in_another(share, causes, monkeypatch):
     """The output promises next to nothing; the pressure, logged, closes its own gap, or not even that."""
@@ -271,6 +273,7 @@ def test_what_is_clear_in_one_segment_stands_whatever_is_left_in_another(share, 
     assert named(found) == causes
 
 
+@pytest.mark.long
 def test_what_was_fitted_beside_an_effect_goes_with_it():
     """An actuator's numbers beside a zone that is left out brought the output further off than no effect."""
     logs = [log.between(0.0, 40.0) for log in session(11, vent=0.8, zone=0.045)]
@@ -366,6 +369,7 @@ def test_the_plain_fits_rank_the_true_effect_first(drifting):
     assert [f.error for f in found.fits] == sorted(f.error for f in found.fits)
 
 
+@pytest.mark.long
 def test_missing_signals_make_the_stage_an_inference():
     found = diagnose(RIG, session(5, vent=0.8, roles=()))
     assert found.where.inferred

@@ -52,7 +52,7 @@ def test_how_much_of_it_is_found():
     assert found.role == "pressure" and found.part == pytest.approx(-0.07, abs=0.01) and found.odds > 0.0
 
 
-@pytest.mark.parametrize("vent", [0.5, 0.8])
+@pytest.mark.parametrize("vent", [0.5, pytest.param(0.8, marks=pytest.mark.long)])
 def test_an_effect_is_not_taken_for_it(vent):
     (first, *_) = explain_all(RIG, session(11, vent=vent), NUMBERS.nats)
     assert first.causes and (taken_up(first) is None or taken_up(first).odds < -5.0)

@@ -83,7 +83,6 @@ ONE_WAY = {
 QUICK_ONE_WAY = {
     (("sensor", "falls late"), 1, "B"),
     (("regulator", "rises late"), 2, "B"),
-    (("actuator", "rises late"), 1, "A"),
 }
 
 

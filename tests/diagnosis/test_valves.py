@@ -85,7 +85,7 @@ def test_a_held_valve_moves_as_its_rule_says(left, anew):
     assert len(np.unique(made)) > 10
 
 
-@pytest.mark.parametrize("band, left", [(4.5, 1.5), (2.5, 2.5)])
+@pytest.mark.parametrize("band, left", [(4.5, 1.5), pytest.param(2.5, 2.5, marks=pytest.mark.long)])
 def test_a_valve_that_sticks_in_a_loop_is_no_hysteresis(band, left):
     found = explained(loop(3, band, left, count=600))
     first = found.causes[0].rivals[0]
@@ -145,7 +145,16 @@ def swept(band, seed=1):
     return Experiment("sweep", 1.0, {"command": u, "output": y})
 
 
-@pytest.mark.parametrize("band", [6.3, 11.19, 16.7, 23.0, 31.0])
+@pytest.mark.parametrize(
+    "band",
+    [
+        6.3,
+        pytest.param(11.19, marks=pytest.mark.long),
+        pytest.param(16.7, marks=pytest.mark.long),
+        23.0,
+        pytest.param(31.0, marks=pytest.mark.long),
+    ],
+)
 def test_a_band_is_found_wherever_it_lies_between_two_starts(band):
     """Many slips in a row fit no band but theirs."""
     (e,) = explain_all(RIG, [swept(band)], 12.0, ["valve_stiction"])
