@@ -27,12 +27,14 @@ SPECIFIED = {"example": [], "fastest": ["--overshoot", "10"]}
 
 def make(folder: Path, few: tuple[str, ...] = ()) -> None:
     """Every golden form, poles of 16 and of all their bits, and designs of the example rig with their C; or
-    only a ``few`` of them, by name.
+    only a ``few`` of these, by name.
     """
     for form, how in {**{form: options(form) for form in FORMS}, **FURTHER}.items():
         if not few or form in few:
             done(["generate", str(CONTROLLER), "--out", str(folder / form), *how])
-    for name, specification in SPECIFIED.items() if not few else ():
+    for name, specification in SPECIFIED.items():
+        if few and name not in few:
+            continue
         controller = folder / f"{name}.toml"
         done(["design", str(EXAMPLE), "--out", str(controller), *specification])
         done(["generate", str(controller), "--out", str(folder / name), "--arithmetic", "f64"])

@@ -48,9 +48,10 @@ def test_as_many_as_are_allowed_are_all_used(tmp_path):
 
 def test_no_plan_becomes_c_that_cannot_count_it():
     """Whatever way it came about."""
-    plan = build_plan(scheduled(COUNT + 1), "f64")
+    plan = build_plan(scheduled(3), "f64")
+    gains = tuple(np.linspace(1.0, 2.0, COUNT + 1).tolist())
     with pytest.raises(PlanError, match=f"at most {COUNT} can be counted"):
-        folder_files(plan, b"")
+        folder_files(replace(plan, schedule=replace(plan.schedule, gains=gains)), b"")
     longer = replace(plan.direct, blocks=(replace(plan.direct.blocks[0], last=LONGEST + 1),))
     with pytest.raises(PlanError, match=f"at most {LONGEST} can be counted"):
         folder_files(replace(plan, schedule=None, direct=longer), b"")

@@ -58,7 +58,14 @@ def test_with_the_conversions_there_is_floating_point_but_in_them(tmp_path):
     assert re.findall(r"\bfoc_\w+_f(?:32|64)\b", text) == []
 
 
-@pytest.mark.parametrize("order", [*permutations(["q31", "f32", "f64"])], ids="-".join)
+ORDERS = [*permutations(["q31", "f32", "f64"])]
+
+
+@pytest.mark.parametrize(
+    "order",
+    [pytest.param(o, marks=() if i == 5 else pytest.mark.long) for i, o in enumerate(ORDERS)],
+    ids="-".join,
+)
 def test_several_in_one_file_in_any_order(order, tmp_path):
     names = [generated(tmp_path / arithmetic, arithmetic, *EXPONENTIAL) for arithmetic in order]
     lines = [f'#include "{kind}/{name}.c"' for kind, name in zip(order, names)]

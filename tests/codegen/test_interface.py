@@ -113,8 +113,10 @@ def test_conversions_saturate_and_round_to_the_nearest(c):
     "name, arithmetic, pattern, by",
     (
         ("spba", "q31", r"rest >= 0\.5f", "rest > 0.5f"),
-        ("spba", "q15", r"scaled >= 32767", "scaled >= 42767"),
-        ("spba", "q31", r"(sched_from_f32.*\n\{\n.*value \* )", r"\g<1>2.0f * "),
+        pytest.param("spba", "q15", r"scaled >= 32767", "scaled >= 42767", marks=pytest.mark.long),
+        pytest.param(
+            "spba", "q31", r"(sched_from_f32.*\n\{\n.*value \* )", r"\g<1>2.0f * ", marks=pytest.mark.long
+        ),
         ("filter", "f32", r"(meas_from_f32.*\n\{\n +return )", r"\g<1>2.0f * "),
         ("spba", "q31", r"(SPBA_PERIOD_US +)10000u", r"\g<1>10001u"),
     ),
@@ -216,15 +218,21 @@ def test_a_state_of_another_configuration_is_refused(tmp_path):
     assert built[0].spba_restore(state, saved) == 0
 
 
-@pytest.mark.parametrize("name, arithmetic", (("spba", "q31"), ("filter", "f32")))
+NOT_SAVED = (
+    ("@.c", r"    at = foc_put\(to, at, .*s->error\[i\].*\n", "    at = foc_put(to, at, 0, 4);\n"),
+    ("@.c", r"    s->error_now = \(uint16_t\)foc_get", "    (void)foc_get"),
+    ("@.c", r"!= sum\)", "!= sum && at == 0u)"),
+    ("foc_save.h", r"bits >>= 8;", "bits >>= 7;"),
+)
+
+
 @pytest.mark.parametrize(
-    "file, pattern, by",
-    (
-        ("@.c", r"    at = foc_put\(to, at, .*s->error\[i\].*\n", "    at = foc_put(to, at, 0, 4);\n"),
-        ("@.c", r"    s->error_now = \(uint16_t\)foc_get", "    (void)foc_get"),
-        ("@.c", r"!= sum\)", "!= sum && at == 0u)"),
-        ("foc_save.h", r"bits >>= 8;", "bits >>= 7;"),
-    ),
+    "name, arithmetic, file, pattern, by",
+    [
+        pytest.param(*one, *fault, marks=() if turn % 2 == i else pytest.mark.long)
+        for turn, fault in enumerate(NOT_SAVED)
+        for i, one in enumerate((("spba", "q31"), ("filter", "f32")))
+    ],
 )
 def test_verify_sees_what_is_not_saved(sound, tmp_path, name, arithmetic, file, pattern, by):
     folder = copied(sound, tmp_path, name, arithmetic)
@@ -255,7 +263,7 @@ def test_resets_and_tracks_out_of_range_say_so(c):
 
 
 @pytest.mark.parametrize("pattern", (r"(r != ref \|\| m != meas\)) \{", r"u != u_applied"))
-@pytest.mark.parametrize("arithmetic", ("q31", "q15"))
+@pytest.mark.parametrize("arithmetic", ("q31", pytest.param("q15", marks=pytest.mark.long)))
 def test_verify_sees_a_flag_of_a_call_that_is_lost(sound, tmp_path, arithmetic, pattern):
     folder = copied(sound, tmp_path, "spba", arithmetic)
     sow(folder, "spba", Fault("flag", "@.c", pattern, r"0) {" if "r != ref" in pattern else "0"))
@@ -285,8 +293,15 @@ def test_flags_that_change_the_bits_are_named(sound, tmp_path, arithmetic, fma):
     assert not refusal(sound / "spba_q31" / "spba.c", "-std=gnu99", "-ffast-math", fma), "integers need none"
 
 
-@pytest.mark.parametrize("options", ({}, {"memory": "exponential"}, {"target": "cortex-m4"},
-                                     {"target": "cortex-m0plus"}), ids=str)  # fmt: skip
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        pytest.param({"memory": "exponential"}, marks=pytest.mark.long),
+        *({"target": target} for target in ("cortex-m4", "cortex-m0plus")),
+    ],
+    ids=str,
+)
 def test_a_header_of_another_version_stops_the_build(tmp_path, options):
     length = {} if "memory" in options else {"length": 100}
     made = generate(paper_controller(), tmp_path, "q31", **options, **length)

@@ -105,15 +105,26 @@ def test_the_work_is_shared_evenly(arithmetic):
 LENGTHS = [*range(22, 26), 40, *range(46, 53), *range(61, 69), 95, 99, 100, *range(126, 131), 200, 257]
 
 
-@pytest.mark.parametrize("third", [0, *(pytest.param(t, marks=pytest.mark.long) for t in (1, 2))])
-def test_random_controllers_agree_in_every_bit(third, tmp_path):
+FEW = (24, 63, 66, 100, 129, 257)  # every remainder of a tile
+
+
+@pytest.mark.parametrize(
+    "seeds",
+    [
+        [LENGTHS.index(length) for length in FEW],
+        *(pytest.param(range(third, 30, 3), marks=pytest.mark.long) for third in range(3)),
+    ],
+    ids=["few", "0", "1", "2"],
+)
+def test_random_controllers_agree_in_every_bit(seeds, tmp_path):
     """Lengths about the edges of tiles and blocks, every remainder of a tile in each third of them; resets
     and tracks in the middle of a group.
     """
-    assert {length % AHEAD for length in LENGTHS[third::3]} == set(range(AHEAD))
-    plans = planned(range(third, len(LENGTHS), 3), LENGTHS[third::3])
+    lengths = [LENGTHS[seed] for seed in seeds]
+    assert {length % AHEAD for length in lengths} == set(range(AHEAD))
+    plans = planned(seeds, lengths)
     looking = [p for p in plans if Kernels(CORES[p.arithmetic]).headers(p)]
-    assert len(looking) >= 0.6 * len(LENGTHS)
+    assert len(looking) >= 1.8 * len(lengths)
     library = compiled(looking, tmp_path)
     for plan in looking:
         result = compare(plan, library, 4000, seed=2, kernels=Kernels(CORES[plan.arithmetic]))
@@ -137,10 +148,11 @@ def test_resets_and_tracks_at_any_step_of_a_group(seed, tmp_path):
         assert np.array_equal(one.u, other.u) and np.array_equal(one.d, other.d), plan.name
 
 
-def test_no_undefined_behaviour(tmp_path):
-    """The same under the sanitizers of gcc, run as a program."""
+@pytest.mark.parametrize("part", [0, *(pytest.param(p, marks=pytest.mark.long) for p in (1, 2, 3))])
+def test_no_undefined_behaviour(part, tmp_path):
+    """Under the sanitizers of gcc, run as a program; each length in an arithmetic of its own here."""
     command, plans = compiler("gcc", *SANITISERS), planned([1, 12, 25], [64, 100, 129])
-    for plan in plans:
+    for plan in plans[part::4]:
         kernels = Kernels(CORES[plan.arithmetic])
         write_files(tmp_path, folder_files(plan, b"", kernels=kernels))
         name, sched = plan.name, ", k * 7" if plan.schedule else ""
@@ -158,8 +170,15 @@ def test_no_undefined_behaviour(tmp_path):
 # ----------------------------------------------------------------------------------------------- folders
 
 
-@pytest.mark.parametrize("target", TARGETS)
-@pytest.mark.parametrize("arithmetic", ["f64", "f32", "q31", "q15"])
+def folders():
+    """Every core in every arithmetic; of the two fixed ones by turns, the other in the long suite."""
+    for i, arithmetic in enumerate(("q31", "q15", "f32", "f64")):
+        for turn, target in enumerate(TARGETS):
+            marks = () if arithmetic[0] == "f" or turn % 2 == i else pytest.mark.long
+            yield pytest.param(arithmetic, target, marks=marks)
+
+
+@pytest.mark.parametrize("arithmetic, target", list(folders()))
 def test_a_folder_for_a_core_is_whole(target, arithmetic, tmp_path):
     """It is read back without a difference, and compiles without a warning."""
     made = generate(FINGER, tmp_path, arithmetic, length=100, target=target, name="finger")
@@ -214,7 +233,9 @@ FAULTS = {
 }
 
 
-@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize(
+    "fault", [pytest.param(f, marks=pytest.mark.long if turn % 2 else ()) for turn, f in enumerate(FAULTS)]
+)
 def test_a_fault_is_seen(fault, tmp_path):
     file, old, new = FAULTS[fault]
     plan = build_plan(paper_controller(100), "q15", name="k")

@@ -35,16 +35,23 @@ def linked(folder: Path, command: list[str], *flags: str) -> Path:
     return target
 
 
-@pytest.mark.parametrize("arithmetic", ["q15", "q31", "f32", "f64"])
-@pytest.mark.parametrize("cc", ["gcc", "clang"])
+def by_turns(*arithmetics: str) -> list:
+    """Each of the arithmetics by one of the compilers; by the other one in the long suite."""
+    return [
+        pytest.param(cc, arithmetic, marks=() if turn % 2 == i else pytest.mark.long)
+        for turn, arithmetic in enumerate(arithmetics)
+        for i, cc in enumerate(("gcc", "clang"))
+    ]
+
+
+@pytest.mark.parametrize("cc, arithmetic", by_turns("q15", "q31", "f32", "f64"))
 def test_the_bits_are_the_same(cc, arithmetic, tmp_path):
     for form, how in FORMS.items():
         generate(paper_controller(60), tmp_path / form, arithmetic, selftest=True, **how)
         assert run(linked(tmp_path / form, compiler(cc, "-flto"), *EXACT)).split() == ["0"], form
 
 
-@pytest.mark.parametrize("arithmetic", ["f32", "f64"])
-@pytest.mark.parametrize("cc", ["gcc", "clang"])
+@pytest.mark.parametrize("cc, arithmetic", by_turns("f32", "f64"))
 def test_contraction_at_link_time_is_noticed_where_it_happens(cc, arithmetic, tmp_path):
     """GCC fuses then, too; clang 14 leaves it out: the program's own instructions say which."""
     flags = ["-O2", "-ffp-contract=fast", *fusing()]
@@ -58,9 +65,9 @@ def test_contraction_at_link_time_is_noticed_where_it_happens(cc, arithmetic, tm
 @pytest.mark.parametrize(
     "name, arithmetic",
     [
-        ("cortex-m4", "q15"),
-        ("cortex-m4", "q31"),
-        ("cortex-m4", "f32"),
+        pytest.param("cortex-m4", "q15", marks=pytest.mark.long),
+        pytest.param("cortex-m4", "q31", marks=pytest.mark.long),
+        pytest.param("cortex-m4", "f32", marks=pytest.mark.long),
         ("cortex-m0plus", "q31"),
         ("rv32imac", "q15"),
     ],

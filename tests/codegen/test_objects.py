@@ -36,8 +36,14 @@ def wanted(thing: Path) -> set[str]:
     return set(run(tool("nm"), "-u", thing).replace("U ", " ").split())
 
 
-@pytest.mark.parametrize("level", ["-O0", "-O2", "-Os"])
-@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+@pytest.mark.parametrize(
+    "arithmetic, level",
+    [
+        pytest.param(arithmetic, level, marks=() if turn % 3 == i else pytest.mark.long)
+        for turn, arithmetic in enumerate(ARITHMETICS)
+        for i, level in enumerate(("-O0", "-O2", "-Os"))
+    ],
+)
 def test_nothing_is_left_to_link(arithmetic, level, tmp_path):
     """No libm, no heap, no soft float, no globals; all that is public carries the name."""
     folder = folder_of(arithmetic, tmp_path)
@@ -164,7 +170,9 @@ _ENDS = {
 }
 
 
-@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+@pytest.mark.parametrize(
+    "arithmetic", ["f32", "q31", *(pytest.param(a, marks=pytest.mark.long) for a in ("f64", "q15"))]
+)
 def test_no_input_leads_to_undefined_behaviour(arithmetic, tmp_path):
     """Any raw input whatever, in the address and undefined-behaviour sanitisers."""
     folder = folder_of(arithmetic, tmp_path)

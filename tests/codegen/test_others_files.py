@@ -34,7 +34,9 @@ FOREIGN = {
 }
 
 
-@pytest.mark.parametrize("what", FOREIGN)
+@pytest.mark.parametrize(
+    "what", [pytest.param(w, marks=pytest.mark.long if turn % 2 else ()) for turn, w in enumerate(FOREIGN)]
+)
 def test_what_another_tool_has_written_stays(tmp_path, what):
     write_files(tmp_path, FOREIGN[what])
     before, package = content(tmp_path), "fmu" if "fmu" in next(iter(FOREIGN[what])) else "plain"
@@ -53,7 +55,10 @@ def test_a_manifest_beside_is_of_a_controller_or_stays(tmp_path):
     assert "precious" in (tmp_path / "one.manifest.json").read_text()
 
 
-@pytest.mark.parametrize("again", ["fmu", "plain"])
+@pytest.mark.parametrize(
+    "again",
+    [pytest.param("fmu", marks=pytest.mark.long), "plain"],
+)
 def test_an_archive_that_somebody_added_to_stays(tmp_path, again):
     """A binary of another system, for instance: built anew, or removed, it would be lost."""
     generate(tmp_path, for_="fmu")

@@ -55,8 +55,10 @@ SETTINGS = {
     "an old processor": {KERNELS: "Nehalem", FEATURES: features("")},
     "no AVX-512": {FEATURES: features("512", "V4")},
 }
-QUICK = ("an old processor",)
-"""The farthest from what is made by any processor of today; the others are in the long suite."""
+FARTHEST = "an old processor"
+"""From what is made by any processor of today; the others are in the long suite, which makes all forms."""
+QUICK = ("f32", "q15", "exp_f64", "exp_q31", "fastest")
+"""Both memories in all kinds of numbers, and a design."""
 
 
 @functools.cache
@@ -80,11 +82,12 @@ def made(setting: str | None = None, *forms: str) -> dict[str, dict[str, str]]:
 
 
 @pytest.mark.parametrize(
-    "setting", [s if s in QUICK else pytest.param(s, marks=pytest.mark.long) for s in SETTINGS]
+    "setting, forms, least",
+    [(FARTHEST, QUICK, 30), *(pytest.param(s, (), 50, marks=pytest.mark.long) for s in SETTINGS)],
 )
-def test_another_processor_makes_the_same_bytes(setting):
-    here, there = made()["files"], made(setting)["files"]
-    assert there.keys() == here.keys() and len(here) > 50
+def test_another_processor_makes_the_same_bytes(setting, forms, least):
+    here, there = (made(one, *forms)["files"] for one in (None, setting))
+    assert there.keys() == here.keys() and len(here) > least
     assert [name for name, digest in there.items() if here[name] != digest] == []
 
 
@@ -94,7 +97,7 @@ def test_the_settings_change_what_is_left_to_the_processor(left, found):
     only; products and solutions of matrices from AVX2 on."""
     if platform.machine() not in ("x86_64", "AMD64") or not features(*found):
         pytest.skip(f"this processor has nothing that could be left out of the {left}")
-    here, old = (made(setting, "q15")["numpy"] for setting in (None, "an old processor"))
+    here, old = (made(setting, *QUICK)["numpy"] for setting in (None, FARTHEST))
     assert old[left] != here[left]
 
 
@@ -119,7 +122,9 @@ def planned(form: str) -> Plan:
     return build_plan(read_controller(CONTROLLER), arithmetic(form), **memory)
 
 
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize(
+    "form", [form if form != "exp_f32" else pytest.param(form, marks=pytest.mark.long) for form in FORMS]
+)
 def test_other_transforms_make_the_same_plan(form, monkeypatch):
     """Of a Fourier transform every library makes another last digit; norms are rounded up for that."""
     here = planned(form)

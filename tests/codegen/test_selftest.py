@@ -63,32 +63,42 @@ def sound(tmp_path_factory) -> Path:
     return folder
 
 
-@pytest.fixture(scope="module")
-def everything(tmp_path_factory) -> tuple[Path, list[str]]:
-    """The self-tests of random controllers in every arithmetic that carries them, in one folder."""
-    folder, names = tmp_path_factory.mktemp("everything"), []
-    for seed in RANDOM:
-        for arithmetic in ARITHMETICS:
+def boards(folder: Path, each: int) -> list[str]:
+    """The self-tests of random controllers in one folder: each of them in so many arithmetics, by turns, of
+    those that carry it."""
+    names = []
+    for turn, seed in enumerate(RANDOM):
+        for arithmetic in [ARITHMETICS[(turn + i) % 4] for i in range(each)]:
             try:
                 plan = build_plan(random_controller(seed, 90), arithmetic, name=f"c{seed}_{arithmetic}")
             except PlanError:
                 continue
             write_files(folder, folder_files(plan, controller_text(plan.controller).encode(), selftest=True))
             names.append(plan.name)
-    assert len(names) > 28
-    return folder, names
+    return names
 
 
-@pytest.mark.parametrize("level", [pytest.param("-O0", marks=pytest.mark.long), "-O2"])
-def test_sound_boards_agree(level, everything):
+@pytest.mark.parametrize(
+    "level, each", [("-O2", 1), *(pytest.param(level, 4, marks=pytest.mark.long) for level in ("-O0", "-O2"))]
+)
+def test_sound_boards_agree(level, each, tmp_path):
     """Every kind of controller, all in one program; not a warning."""
-    folder, names = everything
+    names = boards(tmp_path, each)
+    assert len(names) > 7 * each and {name.split("_")[1] for name in names} == set(ARITHMETICS)
     strict = [flag for flag in STRICT if not flag.startswith("-Wmissing")]
-    assert set(results(folder, names, compiler("gcc"), *strict, "-ffp-contract=off", level)) == {0}
+    assert set(results(tmp_path, names, compiler("gcc"), *strict, "-ffp-contract=off", level)) == {0}
 
 
-@pytest.mark.parametrize("name", CONTROLLERS)
-@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+def by_turns(*arithmetics: str) -> list:
+    """Each of the arithmetics with one of the controllers; with the other in the long suite."""
+    return [
+        pytest.param(arithmetic, name, marks=() if (i + j) % 2 == 0 else pytest.mark.long)
+        for i, arithmetic in enumerate(arithmetics)
+        for j, name in enumerate(CONTROLLERS)
+    ]
+
+
+@pytest.mark.parametrize("arithmetic, name", by_turns(*ARITHMETICS))
 def test_clang_agrees(sound, name, arithmetic):
     folder = sound / f"{name}_{arithmetic}"
     assert results(folder, [name], compiler("clang"), *STRICT, "-O2", "-ffp-contract=off") == [0]
@@ -100,9 +110,8 @@ def fma() -> list[str]:
     return fusing()
 
 
-@pytest.mark.parametrize("name", CONTROLLERS)
-@pytest.mark.parametrize("arithmetic", ["f32", "f64"])
-@pytest.mark.parametrize("cc", ["gcc", "clang"])
+@pytest.mark.parametrize("arithmetic, name", by_turns("f32", "f64"))
+@pytest.mark.parametrize("cc", ["gcc", pytest.param("clang", marks=pytest.mark.long)])
 def test_contraction_is_noticed(sound, name, arithmetic, cc, fma):
     fast = ["-O2", "-ffp-contract=fast", *fma]
     folder, command = sound / f"{name}_{arithmetic}", compiler(cc, *fast, source=FUSED)
@@ -110,9 +119,8 @@ def test_contraction_is_noticed(sound, name, arithmetic, cc, fma):
     assert results(folder, [name], command, *EXACT, *fma) == [0]
 
 
-@pytest.mark.parametrize("name", CONTROLLERS)
-@pytest.mark.parametrize("arithmetic", ["f32", "f64"])
-@pytest.mark.parametrize("cc", ["gcc", "clang"])
+@pytest.mark.parametrize("arithmetic, name", by_turns("f32", "f64"))
+@pytest.mark.parametrize("cc", [pytest.param("gcc", marks=pytest.mark.long), "clang"])
 def test_fast_math_is_noticed(sound, name, arithmetic, cc):
     """Where somebody has silenced the compiler's own complaint."""
     flags = ("-O3", "-ffast-math", "-DFOC_FLAGS_CHECKED")
@@ -181,21 +189,40 @@ FAULTS = {
 }
 
 
-@pytest.mark.parametrize("arithmetic", ["q15", "f32"])
-@pytest.mark.parametrize("fault", FAULTS)
+ONE_ONLY = {"bad inputs": "f32", "range": "q15"}
+
+
+def fault_cases():
+    """Every other fault in one of two arithmetics, by turns; all in both of them in the long suite."""
+    for turn, fault in enumerate(FAULTS):
+        here = ("q15", "f32")[turn // 2 % 2] if turn % 2 == 0 else None
+        here = ONE_ONLY.get(fault, here)
+        for arithmetic in ("q15", "f32"):
+            yield pytest.param(fault, arithmetic, marks=() if arithmetic == here else pytest.mark.long)
+
+
+@pytest.mark.parametrize("fault, arithmetic", list(fault_cases()))
 def test_a_fault_has_a_step(sound, tmp_path, arithmetic, fault):
     file, pattern, by = (named(part, "spba") for part in FAULTS[fault])
     folder = Path(shutil.copytree(sound / f"spba_{arithmetic}", tmp_path / "broken"))
     text, places = re.subn(pattern, by, (folder / file).read_text())
     if not places:
-        assert {"bad inputs": "f32", "range": "q15"}[fault] != arithmetic
+        assert ONE_ONLY[fault] != arithmetic
         pytest.skip(f"{arithmetic} does not have it")
     (folder / file).write_text(text)
     assert 0 < results(folder, ["spba"], compiler("gcc"), *EXACT)[0] < 500
 
 
-@pytest.mark.parametrize("arithmetic", ["q31", "f64"])
-@pytest.mark.parametrize("step", [1, 40, 283])
+@pytest.mark.parametrize(
+    "step, arithmetic",
+    [
+        (283, "q31"),
+        *(
+            pytest.param(*case, marks=pytest.mark.long)
+            for case in ((1, "q31"), (1, "f64"), (40, "q31"), (40, "f64"), (283, "f64"))
+        ),
+    ],
+)
 def test_it_names_the_first_step_that_is_wrong(sound, tmp_path, arithmetic, step, capsys):
     """A vector is changed; the command says so, too, whatever the samples."""
     folder = Path(shutil.copytree(sound / f"spba_{arithmetic}", tmp_path / "broken"))

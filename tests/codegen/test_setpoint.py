@@ -59,7 +59,7 @@ def _aimed(plan, ref, start: float) -> np.ndarray:
         ("f64", SOFT, False),
         ("f32", MODES, True),
         ("q31", MODES, False),
-        ("q15", SOFT, True),
+        pytest.param("q15", SOFT, True, marks=pytest.mark.long),
         *(
             pytest.param(a, c, t, marks=pytest.mark.long)
             for a in ARITHMETICS

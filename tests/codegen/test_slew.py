@@ -34,8 +34,14 @@ def _inputs(count: int = 300) -> Scenario:
     return Scenario(ref, np.full(ref.shape, 0.01), sched, (Reset(0, 0, 0.01, 0.01, 5.0),))
 
 
-@pytest.mark.parametrize("arithmetic", ARITHMETICS)
-@pytest.mark.parametrize("tunable", [False, True])
+@pytest.mark.parametrize(
+    "tunable, arithmetic",
+    [
+        pytest.param(tunable, arithmetic, marks=() if turn % 2 == tunable else pytest.mark.long)
+        for tunable in (False, True)
+        for turn, arithmetic in enumerate(ARITHMETICS)
+    ],
+)
 def test_every_bit_is_the_references(arithmetic, tunable, tmp_path):
     box = Tunable((0.5, 2.0), (0.0, 1.0), (5.0, 10.0))
     generate(replace(SLOW, tunable=box), tmp_path, arithmetic, tunable=tunable, selftest=True)

@@ -6,6 +6,7 @@ Red when the manifest counts a table that is not there, or leaves one out.
 from __future__ import annotations
 
 import re
+from itertools import product
 
 import pytest
 
@@ -21,9 +22,19 @@ LEAD = TransferFunction([(0.05, 0.6), (2.0, 0.0), (3.0, -0.4)], [(0.01, 0.8), (1
 ONE_TAP = TransferFunction([(1.0, 0.0)], [(0.5, 1.0), (1.0, 0.0)])
 
 
-@pytest.mark.parametrize("arithmetic", ["q15", "q31", "f32"])
-@pytest.mark.parametrize("memory", ["short", "exponential"])
-@pytest.mark.parametrize("transfer", [LEAD, ONE_TAP, None], ids=["lead", "one tap", "schedule"])
+SLOW = [("lead", "exponential", "q15"), ("lead", "exponential", "q31")]  # to find the poles of
+
+
+@pytest.mark.parametrize(
+    "transfer, memory, arithmetic",
+    [
+        pytest.param(
+            transfer, *how, id="-".join((name, *how)), marks=pytest.mark.long if (name, *how) in SLOW else ()
+        )
+        for name, transfer in (("lead", LEAD), ("one tap", ONE_TAP), ("schedule", None))
+        for how in product(("short", "exponential"), ("q15", "q31", "f32"))
+    ],
+)
 def test_the_bytes_of_tables_are_those_of_the_c(tmp_path, arithmetic, memory, transfer):
     if transfer is None:
         controller = seed_controller(60, gain=GainSchedule((0.05, 0.1, 0.2), (500.0, 420.0, 350.0)))

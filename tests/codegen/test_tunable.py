@@ -56,12 +56,15 @@ def folders(tmp_path_factory) -> Path:
 
 FOLDERS = [f"{name}_{a}" for name in CONTROLLERS for a in ARITHMETICS] + ["modes_f32", "modes_q31"]
 FOLDERS += ["fine_f32"]
+QUICK = ("finger_f64", "finger_q15", "filter_f32", "modes_q31", "fine_f32")
 
 
 # --------------------------------------------------------------------------------------------------- the bits
 
 
-@pytest.mark.parametrize("name", FOLDERS)
+@pytest.mark.parametrize(
+    "name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.long) for n in FOLDERS]
+)
 def test_every_bit_is_the_references(folders, name):
     """With parameters inside and outside the box at random moments; and the errors within their bounds."""
     result = focgen.verify(folders / name, samples=2000).targets["host"]
@@ -93,7 +96,9 @@ WRONG = {
 _FEW = 2
 
 
-@pytest.mark.parametrize("name", WRONG)
+@pytest.mark.parametrize(
+    "name", ["finger_q31", pytest.param("finger_f32", marks=pytest.mark.long), "filter_f32"]
+)
 def test_wrong_c_is_found(folders, name, tmp_path):
     _found(folders, name, WRONG[name][:_FEW], tmp_path)
 
@@ -146,7 +151,7 @@ def test_the_text_is_the_golden_one(form, tmp_path, request):
     assert files["foc_tune.h"] == (GOLDEN.parents[1] / "c_runtime" / "foc_tune.h").read_bytes()
 
 
-@pytest.mark.parametrize("name", ["gcc", "clang"])
+@pytest.mark.parametrize("name", ["gcc", pytest.param("clang", marks=pytest.mark.long)])
 def test_it_compiles_without_a_warning(folders, name, tmp_path):
     command = compiler(name)
     for folder in ("finger_q15", "modes_f32", "filter_q31", "filter_f64"):
@@ -168,7 +173,9 @@ def _signals(seed: int, count: int = 600) -> tuple[np.ndarray, np.ndarray, np.nd
     return np.full(count, 0.01), meas, rng.uniform(0.0, 0.25, count)
 
 
-@pytest.mark.parametrize("name", ["finger_f64", "finger_q31", "modes_q31"])
+@pytest.mark.parametrize(
+    "name", ["finger_f64", "finger_q31", pytest.param("modes_q31", marks=pytest.mark.long)]
+)
 def test_tuned_it_is_the_controller_that_has_these_gains_and_limits(folders, name, tmp_path):
     """Another one, generated without any tuning: the integral's clamp of the terms of negative order, which
     the box widens, is not reached here.
@@ -191,7 +198,9 @@ def test_tuned_it_is_the_controller_that_has_these_gains_and_limits(folders, nam
     assert np.abs(seen - expected).max() < (1e-11 if "f64" in name else 2e-4)
 
 
-@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+@pytest.mark.parametrize(
+    "arithmetic", ["f32", "q15", *(pytest.param(a, marks=pytest.mark.long) for a in ("f64", "q31"))]
+)
 def test_a_gain_changes_without_a_bump_and_a_narrower_limit_moves_the_output_at_once(folders, arithmetic):
     """At rest the output stays where it is whatever the gain becomes; with an error its rate follows."""
     one = focgen.load(folders / f"finger_{arithmetic}")
@@ -241,7 +250,9 @@ def test_a_damaged_gain_leaves_one_step_out(folders, arithmetic):
     assert u[1:].tolist() == again.run(np.full(19, 0.01), np.full(19, 0.0099), np.full(19, 0.199)).tolist()
 
 
-@pytest.mark.parametrize("name", ["finger_q15", "finger_f32", "filter_f64"])
+@pytest.mark.parametrize(
+    "name", ["finger_q15", "finger_f32", pytest.param("filter_f64", marks=pytest.mark.long)]
+)
 def test_what_is_refused_changes_nothing(folders, name):
     one = focgen.load(folders / name)
     box, output = one.plan.controller.tunable, one.plan.controller.ranges.output
@@ -265,6 +276,7 @@ def test_what_is_refused_changes_nothing(folders, name):
         one.check(Params((1.0,) * (n + 1), *output))
 
 
+@pytest.mark.long
 def test_a_candidate_is_tuned_too(folders, tmp_path):
     folder = folders / "finger_q15"
     own = from_c([folder / "finger_q15.c"], prefix="finger_q15")

@@ -34,7 +34,9 @@ def printed(seed: int) -> tuple:
     return plan, kernels, generate.folder_files(plan, text, selftest=True, kernels=kernels)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(
+    "seed", [pytest.param(s, marks=pytest.mark.long if turn % 2 else ()) for turn, s in enumerate(SEEDS)]
+)
 def test_every_bit_is_the_references(seed, tmp_path):
     """Output, increment, flags, state after each run, macros, and what the self-test says."""
     plan, kernels, files = printed(seed)

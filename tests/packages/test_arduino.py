@@ -172,7 +172,7 @@ int main(void) { setup(); for (int k = 0; k < 1500; k++) { loop(); now += 1000; 
 """
 
 
-@pytest.mark.parametrize("arithmetic", ("q15", "q31", "f32"))
+@pytest.mark.parametrize("arithmetic", ("q15", pytest.param("q31", marks=pytest.mark.long), "f32"))
 def test_the_sketch_drives_the_pin_as_the_reference_would(arithmetic, tmp_path):
     """Compiled as C++ with a board of ours: a loop every millisecond takes a sample every tenth time."""
     controller, folder = seed_controller(40), tmp_path / "spba"

@@ -84,7 +84,10 @@ def simulated(fmpy, path: Path, table, **options):
     return fmpy.simulate_fmu(str(path), validate=True, **{**given, **options})
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case",
+    [c if "f32" in c or "q15" in c else pytest.param(c, marks=pytest.mark.long) for c in CASES],
+)
 def test_it_is_valid_and_simulates_to_the_references_samples(fmpy, case, tmp_path):
     from fmpy.validation import validate_fmu
 
@@ -147,7 +150,7 @@ def test_it_starts_without_a_bump_and_returns_to_a_kept_state(fmpy, fmi, tmp_pat
         (unit.setFMUState if fmi == 3 else unit.setFMUstate)(kept)
 
 
-@pytest.mark.parametrize("fmi", (2, 3))
+@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.long), 3])
 def test_fmpy_makes_the_same_block_of_its_sources(fmpy, fmi, tmp_path, monkeypatch):
     """For a computer that the archive has no binary for: the description lists what is to be compiled."""
     from fmpy.build import build_platform_binary
@@ -213,8 +216,14 @@ def test_another_token_is_refused(fmpy, tmp_path):
         fmpy.instantiate_fmu(folder, description)
 
 
-@pytest.mark.parametrize("arithmetic", ("q15", "f32"))
-@pytest.mark.parametrize("fmi", (2, 3))
+@pytest.mark.parametrize(
+    "fmi, arithmetic",
+    [
+        (2, "q15"),
+        (3, "f32"),
+        *(pytest.param(*one, marks=pytest.mark.long) for one in ((2, "f32"), (3, "q15"))),
+    ],
+)
 def test_the_functions_are_those_of_the_standards_headers(fmpy, arithmetic, fmi, tmp_path):
     """Compiled with the standard's declarations in front of it, and without, warnings being errors."""
     made(tmp_path, FILTER if fmi == 2 else seed_controller(9, name="filter"), arithmetic, fmi)
@@ -243,7 +252,14 @@ def test_texts_of_a_user_are_those_of_the_description(fmpy, tmp_path):
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-@pytest.mark.parametrize("units", [("V", "V ", "bar"), ("1/mm", " ", "bar"), ("a\x01", "a\x02", "a?")])
+@pytest.mark.parametrize(
+    "units",
+    [
+        pytest.param(("V", "V ", "bar"), marks=pytest.mark.long),
+        ("1/mm", " ", "bar"),
+        pytest.param(("a\x01", "a\x02", "a?"), marks=pytest.mark.long),
+    ],
+)
 def test_units_that_look_alike_are_one(fmpy, tmp_path, fmi, units):
     """Two of one name are no valid description."""
     from fmpy.validation import validate_fmu

@@ -39,8 +39,14 @@ def test_a_step_that_is_none_is_refused_at_once(fmpy, fmi, tmp_path):  # noqa: F
         unit.freeInstance()
 
 
-@pytest.mark.parametrize("arithmetic", ("f32", "q15"))
-@pytest.mark.parametrize("fmi", (2, 3))
+@pytest.mark.parametrize(
+    "fmi, arithmetic",
+    [
+        (2, "q15"),
+        (3, "f32"),
+        *(pytest.param(*one, marks=pytest.mark.long) for one in ((2, "f32"), (3, "q15"))),
+    ],
+)
 def test_a_start_that_is_no_number_is_a_limit(fmpy, arithmetic, fmi, tmp_path):  # noqa: F811
     controller = seed_controller(5, name="filter")
     assert controller.integrator

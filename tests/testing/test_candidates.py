@@ -48,7 +48,7 @@ def edited(folders, tmp_path, name, fault):
 # --------------------------------------------------------------------------------------------- folders
 
 
-@pytest.mark.parametrize("within", ("bits", "bound"))
+@pytest.mark.parametrize("within", ("bits", pytest.param("bound", marks=pytest.mark.long)))
 @pytest.mark.parametrize("name", ("spba_f32", "spba_q31", "filter_f32", "filter_q15", "modes_q15"))
 def test_what_is_generated_is_equivalent(folders, name, within):
     found = assert_equivalent(folders / name, folders / name, within, samples=SAMPLES, seed=3)
