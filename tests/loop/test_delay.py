@@ -99,7 +99,7 @@ def test_a_delay_of_nothing_is_the_frozen_step_without():
 @pytest.mark.parametrize(
     "delays, delay",
     [
-        pytest.param(delays, delay, marks=() if delay == turn % 2 else pytest.mark.long)
+        pytest.param(delays, delay, marks=() if (turn, delay) in ((0, 0), (3, 1)) else pytest.mark.long)
         for turn, delays in enumerate(STAGES)
         for delay in (0, 1)
     ],
@@ -189,7 +189,7 @@ def test_side_bands_of_a_slow_roll_off_are_all_there():
 
 
 @pytest.mark.parametrize(
-    "delays", [*(pytest.param(one, marks=pytest.mark.long) for one in STAGES[:2]), *STAGES[2:]]
+    "delays", [*(pytest.param(one, marks=pytest.mark.long) for one in STAGES[:3]), STAGES[3]]
 )
 def test_a_delayed_rig_moves_as_one_with_the_delay_as_an_effect(delays):
     """The effect is replayed between the samples and solved for in the loop: another way to the same."""
@@ -211,7 +211,14 @@ def test_a_delayed_rig_moves_as_one_with_the_delay_as_an_effect(delays):
 # ---------------------------------------------------------------------------------------------------- design
 
 
-@pytest.mark.parametrize("delays", [Delays(regulator=0.08), Delays(actuator=0.08), Delays(0.02, 0.02, 0.04)])
+@pytest.mark.parametrize(
+    "delays",
+    [
+        Delays(regulator=0.08),
+        pytest.param(Delays(actuator=0.08), marks=pytest.mark.long),
+        Delays(0.02, 0.02, 0.04),
+    ],
+)
 def test_every_loop_of_a_delayed_rig_turns_by_omega_times_delay(delays):
     rig, controller = paper_rig(), paper_controller(500)
     plan = build_plan(controller)
@@ -234,17 +241,19 @@ def test_a_study_sees_the_delay():
     assert late.overshoot_pct > soon.overshoot_pct and late.margin_deg < soon.margin_deg
 
 
-def test_a_design_for_a_delayed_rig_settles_and_its_margins_fall_with_the_delay():
+@pytest.mark.parametrize("lates", [(0.1, 0.2), pytest.param((0.0, 0.1), marks=pytest.mark.long)])
+def test_a_design_for_a_delayed_rig_settles_and_its_margins_fall_with_the_delay(lates):
     gains, phases = [], []
-    for late in (0.0, 0.1, 0.2):
+    for late in lates:
         made = design(replace(paper_rig(), delays=Delays(sensor=late)), settling=2.0, setpoints=[0.004, 0.01])
         assert made.holds and made.settling_s <= 2.04 and made.overshoot_pct <= 5.5
         gains.append(min(m.running.gain_db for m in made.margins))
         phases.append(min(m.running.phase_deg for m in made.margins))
-    assert gains[0] > gains[1] + 2.0 > gains[2] + 4.0
-    assert phases[1] > phases[2] + 3.0  # without a delay other gains are the best
+    assert gains[0] > gains[1] + 2.0
+    assert not lates[0] or phases[0] > phases[1] + 3.0  # without a delay other gains are the best
 
 
+@pytest.mark.long
 def test_the_fastest_design_slows_with_the_delay():
     rigs = [replace(paper_rig(), delays=Delays(actuator=late)) for late in (0.0, 0.1, 0.3)]
     times = [design(rig, overshoot=5.0, setpoints=[0.004]).settling_s for rig in rigs]

@@ -111,7 +111,7 @@ def test_small_set_points_are_what_the_frozen_loop_with_the_true_slope_does(made
         assert margin.ideal.crossover_rad_s == pytest.approx(slope * margin.frozen.crossover_rad_s, rel=0.03)
 
 
-@pytest.mark.parametrize("arithmetic", ["q31", "q15"])
+@pytest.mark.parametrize("arithmetic", [pytest.param("q31", marks=pytest.mark.long), "q15"])
 def test_the_gain_margin_is_where_the_running_loop_starts_to_swing(arithmetic):
     """The margin as it will run, against the loop as it runs: 2 % below it swings die out, 2 % above they
     grow.
@@ -140,12 +140,12 @@ def test_margins_follow_gain_and_delay_exactly():
     assert now.crossover_rad_s == pytest.approx(late.crossover_rad_s, rel=1e-9)
 
 
-def test_a_linear_rig_settles_as_wished_at_every_point():
-    for specification in (0.8, 3.0):
-        made = design(linear_rig(*FRACTIONAL), settling=specification)
-        assert not made.controller.scheduled
-        for point in made.points:
-            assert specification * 0.95 < point.running.settling_s <= specification
+@pytest.mark.parametrize("specification", [0.8, pytest.param(3.0, marks=pytest.mark.long)])
+def test_a_linear_rig_settles_as_wished_at_every_point(specification):
+    made = design(linear_rig(*FRACTIONAL), settling=specification)
+    assert not made.controller.scheduled
+    for point in made.points:
+        assert specification * 0.95 < point.running.settling_s <= specification
 
 
 def test_an_integer_second_order_actuator_gets_a_roll_off():

@@ -109,7 +109,7 @@ def test_without_effects_it_is_the_nominal_loop():
         assert np.abs(getattr(found, signal) - truth).max() < 3e-5 * np.abs(truth).max()
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(s, marks=pytest.mark.long) for s in range(2, 4))])
 def test_transport_delay_is_the_loop_delayed_exactly(seed):
     """Three and a half samples of delay: the controller sees what was there then."""
     reference = steps(seed)
@@ -240,6 +240,7 @@ def test_simulate_command_takes_an_augmented_rig(tmp_path, capsys):
     assert payload["setpoints"][0]["overshoot_pct"] > payload["setpoints"][0]["nominal"]["overshoot_pct"]
 
 
+@pytest.mark.long
 def test_a_delay_takes_itself_from_the_delay_margin():
     made = design(paper_rig(), arithmetic="f64", setpoints=(0.006, 0.014))
     late = replace(paper_rig(), effects=({"name": "transport_delay", "form": "delay", "delay": 0.08},))
@@ -258,6 +259,7 @@ def test_a_delay_takes_itself_from_the_delay_margin():
     assert found.overshoot_pct == max(p.effects.overshoot_pct for p in found.points)
 
 
+@pytest.mark.long
 def test_design_says_what_the_margins_lack():
     loose = (
         {"name": "transport_delay", "form": "delay", "delay": 0.02},

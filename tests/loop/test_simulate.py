@@ -49,15 +49,17 @@ def test_the_integrator_leaves_no_steady_error(steps):
         assert abs(late.steady_error) < 0.5 * abs(early.steady_error)
 
 
-def test_an_exponential_memory_runs_like_an_infinite_one(steps):
+@pytest.mark.parametrize(
+    "arithmetic", ["f32", "q15", *(pytest.param(a, marks=pytest.mark.long) for a in ("f64", "q31"))]
+)
+def test_an_exponential_memory_runs_like_an_infinite_one(arithmetic):
     """In every arithmetic the loop is the ideal one's, which no exponentials are in."""
-    for arithmetic in ("f64", "f32", "q31", "q15"):
-        controller = paper_controller(memory="exponential", tolerance=1e-3, arithmetic=arithmetic)
-        found = simulate(paper_rig(), controller, POINTS)
-        step = found.ideal.output[-1]
-        near = 5e-3 if arithmetic == "q15" else 5e-4
-        assert np.abs(found.running.output - found.ideal.output).max() < near * step.max()
-        assert found.states == 13 and "13 exponentials" in simulation_text(found)
+    controller = paper_controller(memory="exponential", tolerance=1e-3, arithmetic=arithmetic)
+    found = simulate(paper_rig(), controller, POINTS)
+    step = found.ideal.output[-1]
+    near = 5e-3 if arithmetic == "q15" else 5e-4
+    assert np.abs(found.running.output - found.ideal.output).max() < near * step.max()
+    assert found.states == 13 and "13 exponentials" in simulation_text(found)
 
 
 def test_the_frozen_loop_stands_beside_it(steps):
@@ -99,13 +101,13 @@ def test_a_short_memory_shows_in_the_response():
 
 
 def test_consecutive_steps_start_where_the_last_one_ended():
-    found = simulate(paper_rig(), paper_controller(), (0.004, 0.01, 0.006), consecutive=True, duration=6.0)
-    assert found.running.output.shape == (1800, 1)
+    found = simulate(paper_rig(), paper_controller(), (0.004, 0.01, 0.006), consecutive=True, duration=3.0)
+    assert found.running.output.shape == (900, 1)
     assert [r.start for r in found.setpoints] == pytest.approx([0.0, 0.004, 0.01])
     reference = found.running.reference[:, 0]
-    assert reference[599] == 0.004 and reference[600] == 0.01 and reference[-1] == 0.006
-    alone = simulate(paper_rig(), paper_controller(), (0.004,), duration=6.0)
-    assert np.abs(found.running.output[:600, 0] - alone.running.output[:, 0]).max() < 1e-12
+    assert reference[299] == 0.004 and reference[300] == 0.01 and reference[-1] == 0.006
+    alone = simulate(paper_rig(), paper_controller(), (0.004,), duration=3.0)
+    assert np.abs(found.running.output[:300, 0] - alone.running.output[:, 0]).max() < 1e-12
 
 
 def test_limits_hold_the_command():
@@ -115,6 +117,7 @@ def test_limits_hold_the_command():
     assert found.setpoints[0].overshoot_pct < 20.0  # without anti-windup it would be far more
 
 
+@pytest.mark.long
 def test_an_unstable_loop_is_said():
     louder = replace(
         paper_controller(), gain=6000.0, ranges=replace(paper_controller().ranges, schedule=None)

@@ -120,6 +120,7 @@ def test_the_worst_step_is_that_of_the_rig_in_that_corner(made):
         assert getattr(simulated, name).value == pytest.approx(getattr(made.worst, name).value, rel=1e-6)
 
 
+@pytest.mark.long
 def test_more_uncertainty_is_worse(made):
     """Of the same controller."""
     found = []
@@ -132,6 +133,7 @@ def test_more_uncertainty_is_worse(made):
         assert more.settling_s.value > less.settling_s.value
 
 
+@pytest.mark.long
 def test_the_simulated_corners_hold_the_worst_of_all(made):
     """All that the actuator may be off by: none settles later than what is reported, or overshoots more."""
     given = paper_rig().uncertainty.actuator
@@ -140,14 +142,15 @@ def test_the_simulated_corners_hold_the_worst_of_all(made):
         actuator = Relative(gain * given.gain, time * given.time, alpha * given.alpha)
         off = Uncertainty(Relative(0.02 * gain, 0.1), actuator, Relative(0.02 * gain, 0.1))
         rig = replace(moved(paper_rig(), off), uncertainty=KNOWN)
-        rows += simulate(rig, made.controller, [0.004, 0.014], duration=8.0).setpoints
+        rows += simulate(rig, made.controller, [0.004, 0.014], duration=5.0).setpoints
     assert made.worst.overshoot_pct.value > max(r.overshoot_pct for r in rows) - 0.2
     assert made.worst.settling_s.value > 0.99 * max(r.settling_s for r in rows)
 
 
+@pytest.mark.long
 def test_set_points_one_after_the_other_are_judged_as_they_follow():
     order = [0.004, 0.012, 0.006]
-    found = simulate(paper_rig(), paper_controller(200), order, consecutive=True)
+    found = simulate(paper_rig(), paper_controller(200), order, consecutive=True, duration=4.0)
     extreme = found.worst.overshoot_pct
     rig = replace(moved(paper_rig(), extreme.off), uncertainty=KNOWN)
     there = simulate(rig, paper_controller(200), order, consecutive=True, duration=found.duration)
@@ -170,7 +173,7 @@ def test_a_rigs_linear_effects_are_in_its_worst_margins():
     assert soon.delay_s.value - behind.delay_s.value == pytest.approx(0.08, abs=2e-4)
 
 
-def test_both_commands_report_it(tmp_path, capsys):
+def test_the_command_that_simulates_reports_it(tmp_path, capsys):
     rig = replace(paper_rig(), uncertainty=Uncertainty(sensor=Relative(0.02, 0.3)))
     write_rig(rig, tmp_path / "rig.toml")
     write_controller(paper_controller(200), tmp_path / "controller.toml")
@@ -180,6 +183,14 @@ def test_both_commands_report_it(tmp_path, capsys):
     assert worst["phase_deg"] < worst["nominal"]["phase_deg"] and worst["corners"] == 32
     assert abs(worst["at"]["phase_deg"]["off"]["sensor"]["time"]) == 0.3
     assert worst["at"]["overshoot_pct"]["setpoint"] == 0.004
+
+
+@pytest.mark.long
+def test_the_command_that_designs_reports_it(tmp_path, capsys):
+    write_rig(
+        replace(paper_rig(), uncertainty=Uncertainty(sensor=Relative(0.02, 0.3))), tmp_path / "rig.toml"
+    )
+    files = [str(tmp_path / "rig.toml"), str(tmp_path / "controller.toml")]
     assert main(["design", files[0], "--out", files[1], "--setpoints", "0.004", "0.01", "--json"]) == 0
     worst = json.loads(capsys.readouterr().out)["worst"]
     assert set(worst) == {
