@@ -107,7 +107,7 @@ def test_tables_of_whole_orders_end_at_the_order():
 @pytest.mark.parametrize(
     "order, length",
     [
-        pytest.param(order, length, marks=() if (turn + i) % 2 == 0 else pytest.mark.long)
+        pytest.param(order, length, marks=() if turn % 4 == i else pytest.mark.long)
         for turn, order in enumerate([0.1, 0.6, 0.97, 1.0, 1.4, 1.97, 2.0, 2.5])
         for i, length in enumerate([1, 2, 5, 100])
     ],

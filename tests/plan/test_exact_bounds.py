@@ -50,8 +50,12 @@ def shares(plan, physical: Scenario) -> np.ndarray:
 
 @pytest.mark.parametrize(
     "seeds",
-    [range(36), *(pytest.param(range(a, a + 60), marks=pytest.mark.long) for a in range(36, 960, 60))],
-    ids=lambda seeds: f"{seeds.start}-{seeds.stop}",
+    [
+        range(0, 36, 3),
+        pytest.param(range(36), marks=pytest.mark.long),
+        *(pytest.param(range(a, a + 60), marks=pytest.mark.long) for a in range(36, 960, 60)),
+    ],
+    ids=lambda seeds: f"{seeds.start}-{seeds.stop}-{seeds.step}",
 )
 def test_no_driven_error_exceeds_its_bound(seeds):
     """Every kind of controller that the campaign of equality draws, in four arithmetics."""
@@ -105,8 +109,13 @@ def test_a_sum_of_taps_is_within_its_last_places(seed):
     assert bound == 0.0 or error > bound / (2.0 + len(weights))
 
 
-@pytest.mark.parametrize("arithmetic", ("f32", "f64"))
-@pytest.mark.parametrize("factors", (None, (0.4, 1.7)))
+@pytest.mark.parametrize(
+    "factors, arithmetic",
+    [
+        *((None, "f64"), ((0.4, 1.7), "f32")),
+        *(pytest.param(*case, marks=pytest.mark.long) for case in ((None, "f32"), ((0.4, 1.7), "f64"))),
+    ],
+)
 def test_the_gain_is_as_near_as_its_piece_of_the_schedule_says(arithmetic, factors):
     """Thousands of values of the scheduling signal and, where it has any, of the factors."""
     kind, unit = (np.float32, 2.0**-24) if arithmetic == "f32" else (np.float64, 2.0**-53)

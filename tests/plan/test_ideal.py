@@ -126,7 +126,21 @@ def test_clamps_hold_the_output_and_let_go_at_once():
 # ---------------------------------------------------------------------------------- frequency response
 
 
-@pytest.mark.parametrize("seed", [0, 2, 4, 5, 7, 10, 12, 14, 15, 20])
+@pytest.mark.parametrize(
+    "seed",
+    [
+        0,
+        pytest.param(2, marks=pytest.mark.long),
+        4,
+        pytest.param(5, marks=pytest.mark.long),
+        7,
+        pytest.param(10, marks=pytest.mark.long),
+        12,
+        pytest.param(14, marks=pytest.mark.long),
+        15,
+        pytest.param(20, marks=pytest.mark.long),
+    ],
+)
 @pytest.mark.parametrize("arithmetic", ["f64", "q31"])
 def test_running_response_is_what_a_sine_shows(seed, arithmetic):
     """A sine through the bit-true reference, its amplitude and phase read off the last periods."""

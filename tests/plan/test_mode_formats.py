@@ -15,7 +15,7 @@ from focgen.plan.plan import Bank
 from tests.controllers import simple
 from tests.plan.derived import planned, plans
 from tests.plan.ledger import half, hull, minus, reached, shifted, span, weighted, worst
-from tests.plan.test_reached import SUMS, finer, fixed, of_seeds, top
+from tests.plan.test_reached import SEEDS, SUMS, finer, fixed, top
 
 
 @fixed
@@ -35,8 +35,14 @@ def test_what_drives_round_is_a_count_of_each_and_what_their_means_shift_out(ari
     assert len(plan.direct.banks) == 2 and shift_seen == (arithmetic == "q31")
 
 
-@of_seeds
-@fixed
+@pytest.mark.parametrize(
+    "seeds, arithmetic",
+    [
+        pytest.param(seeds, kind, id=f"{seeds.start}-{kind}", marks=() if turn % 2 == i else pytest.mark.long)
+        for turn, seeds in enumerate(SEEDS)
+        for i, kind in enumerate(("q15", "q31"))
+    ],
+)
 def test_the_formats_of_sums_and_modes_are_what_they_can_reach(arithmetic, seeds):
     for plan in plans(seeds, arithmetic):
         for table in plan.sums:

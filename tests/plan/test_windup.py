@@ -32,8 +32,15 @@ def at_limit(order: float, arithmetic: str, turned: float, resets: tuple[Reset, 
     return int(np.argmax(u[LASTED:] < 10.0)) if (u[LASTED:] < 10.0).any() else LATER
 
 
-@pytest.mark.parametrize("arithmetic", ["q31", "f64"])
-@pytest.mark.parametrize("order", [0.5, 1.0])
+@pytest.mark.parametrize(
+    "order, arithmetic",
+    [
+        (0.5, "f64"),
+        (1.0, "q31"),
+        pytest.param(0.5, "q31", marks=pytest.mark.long),
+        pytest.param(1.0, "f64", marks=pytest.mark.long),
+    ],
+)
 def test_ahead_of_an_integrator_it_winds_up_for_as_long_as_is_said(arithmetic, order):
     """Up to as long as the error has lasted, at a fifth of its size up to five times; a reset ends it."""
     same, fifth = (at_limit(order, arithmetic, -e) for e in (0.9, 0.18))

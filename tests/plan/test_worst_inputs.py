@@ -69,7 +69,7 @@ def responses(plan: Plan) -> dict[str, np.ndarray]:
 
 
 @pytest.mark.parametrize("seeds", [range(a, a + 10) for a in range(0, 40, 10)], ids=lambda s: str(s.start))
-@pytest.mark.parametrize("arithmetic", ("q15", "f64"))
+@pytest.mark.parametrize("arithmetic", ("q15", pytest.param("f64", marks=pytest.mark.long)))
 def test_no_input_of_its_length_takes_a_node_further(arithmetic, seeds):
     for plan in plans(seeds, arithmetic):
         ref, meas = plan.reference, plan.measurement

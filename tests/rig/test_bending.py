@@ -55,7 +55,7 @@ def test_a_first_order_plant_solves_its_own_equation():
         np.testing.assert_allclose(made_by(actuator), exact, atol=2e-4)
 
 
-@pytest.mark.parametrize("power", [0.5, 1.7])
+@pytest.mark.parametrize("power", [0.5, pytest.param(1.7, marks=pytest.mark.long)])
 def test_what_goes_with_a_power_of_the_level_solves_its_own_equation(power):
     """A share of 0.7 flows out as level**power, 2 in full: from empty, to full, and to empty again."""
     x = np.interp(T, [0, 1, 2, 4, 5, 6], [0.0, 0.0, 0.9, 0.2, 1.0, 0.0])

@@ -224,7 +224,7 @@ def test_replay_of_a_log_made_with_2_37_samples_of_delay():
 
 def test_a_delay_that_the_rig_file_knows_is_no_gap():
     """Four samples of delay: named where the rig file does not have them, nothing where it does."""
-    logs = session(11, delay=4)
+    logs = [log for log in session(11, delay=4) if log.name in ("steps", "stairs")]
     known = replace(RIG, delays=Delays(regulator=4 * RIG.sample_time))
     found = diagnose(known, logs)
     assert found.verdict in ("none", "parameters") and not found.causes

@@ -92,6 +92,7 @@ def test_a_level_that_is_held_drives_it_too(seed):
         assert np.sqrt(np.mean(between(signals, starts, told, k) ** 2)) < 0.02
 
 
+@pytest.mark.long
 def test_a_dead_time_of_ten_response_times_is_found():
     """Of the gauge, which takes a minute: the past that the logs begin with is in it for far longer."""
     _, _, logs = session_of(late=600.0, noise=0.03, seed=3)

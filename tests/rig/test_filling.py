@@ -55,7 +55,7 @@ def in_small_steps(own, u, h, gain, times, held, parts=25):
 
 
 @pytest.mark.parametrize("between", [Between.HELD, Between.STRAIGHT])
-@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("sign", [pytest.param(1.0, marks=pytest.mark.long), -1.0])
 @pytest.mark.parametrize("effect, form, value", OWN)
 def test_a_regulator_fills_and_vents_by_its_own_equation(effect, form, value, sign, between):
     """T p' = u - p, with what the effect makes of it, in steps of a 25th of a sample."""
@@ -72,7 +72,7 @@ def test_a_regulator_fills_and_vents_by_its_own_equation(effect, form, value, si
 
 
 @pytest.mark.parametrize("between", [Between.HELD, Between.STRAIGHT])
-@pytest.mark.parametrize("lags_ahead", [(0.06,), (0.1, 0.03)])
+@pytest.mark.parametrize("lags_ahead", [pytest.param((0.06,), marks=pytest.mark.long), (0.1, 0.03)])
 @pytest.mark.parametrize("effect, form, value", OWN)
 def test_what_fills_and_vents_is_the_slowest_lag(effect, form, value, lags_ahead, between):
     """The valve's lags, one after another, and then T p' = u - p with what the effect makes of it, in steps

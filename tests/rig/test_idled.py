@@ -62,7 +62,7 @@ def test_between_two_logs_the_input_is_what_the_later_one_begins_with():
     assert not begin.known  # nobody has seen the gap
 
 
-@pytest.mark.parametrize("clock", ["one", "of its own"])
+@pytest.mark.parametrize("clock", ["one", pytest.param("of its own", marks=pytest.mark.long)])
 def test_a_session_is_told_by_its_earlier_logs_from_the_start(clock):
     """Before any effect is looked for, and where no clock says how long the rig idled, too."""
     rng, noise = np.random.default_rng(3), 0.003

@@ -47,7 +47,7 @@ def made_by(actuator, effects, balanced=False, delay=0.0):
     return Chain(rig, effects).run(loads(), "actuator", "actuator", run_of(balanced))
 
 
-@pytest.mark.parametrize("values", PULLS)
+@pytest.mark.parametrize("values", [PULLS[0], pytest.param(PULLS[1], marks=pytest.mark.long)])
 def test_a_coil_is_what_its_equation_makes_in_small_steps(values):
     first, second, scale = values
     made, t, x = made_by(COIL, (placed(values),))[: N // 2], H * np.arange(N // 2), loads()[: N // 2]

@@ -128,9 +128,9 @@ def _integrated(plant, spring, x, t):
     "spring",
     [
         Spring(0.5, -4.0, 25.0),
-        Spring(0.9, 6.0, 25.0),
+        pytest.param(Spring(0.9, 6.0, 25.0), marks=pytest.mark.long),
         Spring(0.5, 4.0, 25.0, 1.5, 0.1),
-        Spring(0.5, 1.0, 3.0, 0.8, 0.1),
+        pytest.param(Spring(0.5, 1.0, 3.0, 0.8, 0.1), marks=pytest.mark.long),
         Spring(0.9, 6.0, 25.0, added=True),
     ],
 )
@@ -165,6 +165,7 @@ def test_a_plant_that_only_creeps_takes_few_steps_and_comes_as_close():
     assert _levels(plant, dynamics, H)[0] < _levels(Plant(2, 0.1, 0.3, 40.0), dynamics, H)[0]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rise", [Rise(0.4, 0.5), Rise(0.3, 0.004)])
 def test_friction_that_rises_with_the_speed_against_an_integrator(rise):
     """It rises from nothing, so that nothing sticks."""
@@ -183,8 +184,13 @@ def test_friction_that_rises_with_the_speed_against_an_integrator(rise):
     assert np.max(np.abs(made - respond(plant, x, rest(len(x)), H))) > 0.01 * np.max(np.abs(exact))
 
 
-@pytest.mark.parametrize("rise", [Rise(0.4, 0.5), Rise(0.3, 0.004), Rise(0.1, 0.0015), Rise(-0.02, 0.01)])
-@pytest.mark.parametrize("force", [0.0, 0.05])
+RISES = [Rise(0.4, 0.5), Rise(0.1, 0.0015), Rise(-0.02, 0.01)]
+
+
+@pytest.mark.parametrize(
+    "rise", [Rise(0.3, 0.004), *(pytest.param(r, marks=pytest.mark.long) for r in RISES)]
+)
+@pytest.mark.parametrize("force", [pytest.param(0.0, marks=pytest.mark.long), 0.05])
 @pytest.mark.parametrize("plant", [Plant(2, 0.05, 3.0, 20.0), Plant(2, 0.002, 0.1, 1.0)])
 def test_steep_friction_on_a_light_plant_against_small_implicit_steps(plant, force, rise):
     """It stops the plant within 0.01 to 4 ms, which turns round, creeps and, with dry friction, sticks."""

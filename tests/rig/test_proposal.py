@@ -219,7 +219,7 @@ def test_the_command_writes_a_rig_that_identify_takes(tmp_path, capsys):
         k: v for k, v in given.signals.columns().items() if k != "reference"
     }
     assert told["rig"]["signals"]["run"] == "run" and told["doubts"] and f"--rig {out}" in told["next"]
-    words = [*told["next"].split()[1:-1], str(tmp_path / "identified.toml"), "--no-integer", "--to", "20"]
+    words = [*told["next"].split()[1:-1], str(tmp_path / "identified.toml"), "--no-integer", "--to", "10"]
     assert main(words) == 0 and read_rig(tmp_path / "identified.toml").actuator.T > 0
     assert main(["init", log, "--out", log]) == 2 and Path(log).stat().st_size > 1000
 

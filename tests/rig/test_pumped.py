@@ -75,7 +75,7 @@ def test_a_bladder_is_as_full_as_it_was_left(rig, roles):
 
 
 @pytest.mark.parametrize("roles", SETS.values(), ids=SETS)
-@pytest.mark.parametrize("first", [75, 405, 490])
+@pytest.mark.parametrize("first", [75, pytest.param(405, marks=pytest.mark.long), 490])
 def test_a_pump_may_be_on_its_way_as_a_log_begins(roles, first):
     """Filling from empty, venting, and filling from half; of strokes longer ago the silicone creeps on."""
     rig = RIGS["fractional"]
@@ -83,8 +83,12 @@ def test_a_pump_may_be_on_its_way_as_a_log_begins(roles, first):
     assert left(rig, begun(rig, [log])) < 0.15 * left(rig, [log])
 
 
-@pytest.mark.parametrize("flow", [4.0, -3.0, 1.5])
-@pytest.mark.parametrize("roles", [("output",), ("pressure", "output")], ids=["A", "B"])
+@pytest.mark.parametrize(
+    "flow", [pytest.param(4.0, marks=pytest.mark.long), pytest.param(-3.0, marks=pytest.mark.long), 1.5]
+)
+@pytest.mark.parametrize(
+    "roles", [("output",), pytest.param(("pressure", "output"), marks=pytest.mark.long)], ids=["A", "B"]
+)
 def test_a_pump_that_starts_with_the_log_has_left_its_volume_before(roles, flow):
     """It stood there for long: no stroke just before the log has put that in."""
     rig, told = RIGS["whole"], []
@@ -97,8 +101,10 @@ def test_a_pump_that_starts_with_the_log_has_left_its_volume_before(roles, flow)
     assert sum(told) <= 1
 
 
-@pytest.mark.parametrize("roles", [("output",), ("pressure", "output")], ids=["A", "B"])
-@pytest.mark.parametrize("since", [2, 8])
+@pytest.mark.parametrize(
+    "roles", [("output",), pytest.param(("pressure", "output"), marks=pytest.mark.long)], ids=["A", "B"]
+)
+@pytest.mark.parametrize("since", [pytest.param(2, marks=pytest.mark.long), 8])
 def test_a_pump_that_is_on_its_way_has_been_left_anywhere_before(roles, since):
     """It has stood at 14 for long; the last stroke began 0.1 or 0.4 s before the log, and shows no other."""
     rig = RIGS["whole"]
@@ -150,7 +156,7 @@ def in_small_steps(flow, stood, act):
     return np.array(found)
 
 
-@pytest.mark.parametrize("stood", [0.0, 3.0])
+@pytest.mark.parametrize("stood", [pytest.param(0.0, marks=pytest.mark.long), 3.0])
 @pytest.mark.parametrize(
     "lost, act",
     [
@@ -183,13 +189,25 @@ def moved_in_small_steps(flow, stood, asked, rate, gap):
 MOST, PACE = 0.6 * np.max(np.abs(FLOW)), 0.5 * np.max(np.abs(FLOW))
 
 
-@pytest.mark.parametrize("stood", [0.0, 3.0])
+@pytest.mark.parametrize("stood", [pytest.param(0.0, marks=pytest.mark.long), 3.0])
 @pytest.mark.parametrize(
     "less, asked, rate, gap",
     [
         (("flow_limit", "driven", MOST), lambda q: np.clip(q, -MOST, MOST), float, 0.0),
-        (("flow_limit", "spent", PACE), float, lambda v: np.clip(v, -PACE, PACE), 0.0),
-        (("valve_asymmetry", "back", 0.9), float, lambda v: v * (0.9 if v < 0.0 else 1.0), 0.0),
+        pytest.param(
+            ("flow_limit", "spent", PACE),
+            float,
+            lambda v: np.clip(v, -PACE, PACE),
+            0.0,
+            marks=pytest.mark.long,
+        ),
+        pytest.param(
+            ("valve_asymmetry", "back", 0.9),
+            float,
+            lambda v: v * (0.9 if v < 0.0 else 1.0),
+            0.0,
+            marks=pytest.mark.long,
+        ),
         (("valve_stiction", "lost_motion", 0.4), float, float, 0.4),
     ],
     ids=["driver", "speed", "way", "spindle"],

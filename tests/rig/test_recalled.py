@@ -170,7 +170,7 @@ def test_experiments_that_each_began_at_rest_are_believed(tmp_path: Path) -> Non
     assert not any(log.before("pressure").known for log in begun_session(rig, reset))
 
 
-@pytest.mark.parametrize("zero", [-0.4, 0.0, 0.4])
+@pytest.mark.parametrize("zero", [-0.4, 0.0, pytest.param(0.4, marks=pytest.mark.long)])
 @pytest.mark.parametrize("remembers", [True, False])
 def test_a_zero_that_is_off_is_no_past_and_hides_none(tmp_path: Path, zero: float, remembers: bool) -> None:
     """It is the same in every log, those too that nothing was before; a past is not in the first one. The
@@ -210,7 +210,7 @@ def _own_clocks(logs: list[Experiment]) -> tuple[Experiment, ...]:
     return in_session_order([replace(log, start=0.0) for log in logs])
 
 
-@pytest.mark.parametrize("rest", [3.0, 10.0, 30.0])
+@pytest.mark.parametrize("rest", [pytest.param(3.0, marks=pytest.mark.long), 10.0, 30.0])
 def test_how_long_it_rested_is_told_where_every_log_has_a_clock_of_its_own(
     tmp_path: Path, rest: float
 ) -> None:
@@ -223,7 +223,9 @@ def test_how_long_it_rested_is_told_where_every_log_has_a_clock_of_its_own(
     assert _left(rig, list(told)) < 1.2 * NOISE
 
 
-@pytest.mark.parametrize("rest", [8.0, 20.0])  # told of a step from a little, and near 0 at first
+@pytest.mark.parametrize(
+    "rest", [pytest.param(8.0, marks=pytest.mark.long), 20.0]
+)  # told of a step from a little, and near 0 at first
 def test_a_log_that_begins_with_its_first_step_was_at_rest_or_recalls(tmp_path: Path, rest: float) -> None:
     """The input is not 0 at any sample ahead of the first step; that the output is near 0 says it was."""
     rig = _rig(tmp_path)
@@ -263,7 +265,7 @@ def _behind(rig: Rig, logs: Sequence[Experiment], slower: float) -> tuple[Rig, l
     return replace(regulated, signals=replace(rig.signals, command="u_V")), found
 
 
-@pytest.mark.parametrize("slower", [1.0, 8.0])
+@pytest.mark.parametrize("slower", [1.0, pytest.param(8.0, marks=pytest.mark.long)])
 def test_a_stage_that_fits_badly_hides_no_past_of_another(tmp_path: Path, slower: float) -> None:
     """The squares of all stages added up are those of the worst one: what the output tells of the past is a
     hundredth of what a regulator leaves that is eight times slower than given."""
@@ -279,7 +281,11 @@ def _cut(at: int) -> list[Experiment]:
     return [Experiment(f"part {k}", H, s, start=k * at * H) for k, s in enumerate(signals)]
 
 
-@pytest.mark.parametrize("at", [182, 300, 400], ids=["just behind a step", "later", "at another level"])
+@pytest.mark.parametrize(
+    "at",
+    [182, pytest.param(300, marks=pytest.mark.long), 400],
+    ids=["just behind a step", "later", "at another level"],
+)
 def test_a_recording_cut_in_two_goes_on_whatever_its_input_is(tmp_path: Path, at: int) -> None:
     rig, parts = _rig(tmp_path), _cut(at)
     whole = {role: np.concatenate([p[role] for p in parts]) for role in ("pressure", "output")}
@@ -290,7 +296,15 @@ def test_a_recording_cut_in_two_goes_on_whatever_its_input_is(tmp_path: Path, at
     np.testing.assert_array_equal(made, exact)
 
 
-@pytest.mark.parametrize("change", ["late", "early", "moved", "by a clock of its own"])
+@pytest.mark.parametrize(
+    "change",
+    [
+        pytest.param("late", marks=pytest.mark.long),
+        "early",
+        "moved",
+        pytest.param("by a clock of its own", marks=pytest.mark.long),
+    ],
+)
 def test_a_log_that_begins_elsewhere_or_later_does_not_go_on(tmp_path: Path, change: str) -> None:
     rig, (first, second) = _rig(tmp_path), _cut(100)
     if change == "late":

@@ -89,7 +89,9 @@ def test_in_equilibrium_a_preload_is_lost(side):
     np.testing.assert_allclose(other, side * 0.7, atol=1e-6)
 
 
-@pytest.mark.parametrize(("m", "stiffness"), [(0.05, 1.0), (0.05, 40.0), (0.003, 40.0)])
+@pytest.mark.parametrize(
+    ("m", "stiffness"), [(0.05, 1.0), pytest.param(0.05, 40.0, marks=pytest.mark.long), (0.003, 40.0)]
+)
 def test_an_obstacle_against_an_integrator(m, stiffness):
     t = H * np.arange(600)
     x, place = 0.6 - 0.6 * np.cos(2.3 * t) + 0.2 * np.sin(5.1 * t), 0.5
@@ -166,7 +168,7 @@ def test_what_is_taken_along_lags_behind_by_the_play():
     assert np.all(np.abs(seen - plain) < 0.1 + 1e-9)
 
 
-@pytest.mark.parametrize("speed", [0.2, 2.0])
+@pytest.mark.parametrize("speed", [0.2, pytest.param(2.0, marks=pytest.mark.long)])
 def test_a_damper_that_is_another_on_the_way_back(speed):
     t = H * np.arange(900)
     x, m, c = 0.6 - 0.6 * np.cos(2.3 * t) + 0.2 * np.sin(5.1 * t), 0.02, 0.7

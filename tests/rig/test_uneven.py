@@ -36,8 +36,15 @@ def in_small_steps(by, rate, even, curve=0.0, fine=100):
     return np.array(made)
 
 
-@pytest.mark.parametrize("by", ["level", "time", "speed"])
-@pytest.mark.parametrize("rate, curve", [(0.6, 0.0), (-0.6, 0.0), (0.2, 1.0)])
+@pytest.mark.parametrize("by", ["level", pytest.param("time", marks=pytest.mark.long), "speed"])
+@pytest.mark.parametrize(
+    "rate, curve",
+    [
+        pytest.param(0.6, 0.0, marks=pytest.mark.long),
+        pytest.param(-0.6, 0.0, marks=pytest.mark.long),
+        (0.2, 1.0),
+    ],
+)
 def test_a_lag_answers_as_its_equation_does(by, rate, curve):
     even = linear.run(LAG, U, RUN.rest, H, RUN.duration, Between.HELD) / GAIN
     made = uneven.run(LAG, U, RUN, Pace(by, rate, curve), Between.HELD) / GAIN
@@ -47,7 +54,14 @@ def test_a_lag_answers_as_its_equation_does(by, rate, curve):
     assert np.max(np.abs(made - true)) < 0.08 * change  # what a pace is within a sample is not followed
 
 
-@pytest.mark.parametrize("rate, curve", [(2.5, 0.0), (2.5, 2.5), (1.5, -1.5)])
+@pytest.mark.parametrize(
+    "rate, curve",
+    [
+        pytest.param(2.5, 0.0, marks=pytest.mark.long),
+        (2.5, 2.5),
+        pytest.param(1.5, -1.5, marks=pytest.mark.long),
+    ],
+)
 def test_a_level_of_either_sign_is_met(rate, curve):
     """The last is twenty times as fast at the lowest level as at none."""
     u, h, fine = np.repeat([0.0, 1.0, -1.0, 0.5, -0.7], 150), 0.05, 200

@@ -70,7 +70,9 @@ def further(form, growth, scale, y, most, work):
     return 1.0 + growth * (1.0 - np.exp(-w / scale))
 
 
-@pytest.mark.parametrize("form, growth, scale", WORN)
+@pytest.mark.parametrize(
+    "form, growth, scale", [*(pytest.param(*worn, marks=pytest.mark.long) for worn in WORN[:2]), *WORN[2:]]
+)
 def test_a_mass_on_a_spring_that_wears_in_small_steps(form, growth, scale):
     """Of 0.04 y'' + 0.2 y' + y/further = 2 x, a two-hundredth of a sample each."""
     y = v = most = work = 0.0
