@@ -82,7 +82,9 @@ def library_of(read, name: str, chain=ZIG) -> TargetLibrary:
     return TargetLibrary(core(name), chain, [read.plan], [read.path])
 
 
-@pytest.mark.parametrize("name", ("cortex-m0plus", "cortex-m4", "rv32imac"))
+@pytest.mark.parametrize(
+    "name", ("cortex-m0plus", "cortex-m4", pytest.param("rv32imac", marks=pytest.mark.long))
+)
 def test_instructions_are_those_a_slow_count_gives(folders, name):
     """One by one in Python, from the entry of the step to its return."""
     read = folders["q15", 12]
@@ -107,7 +109,7 @@ def test_instructions_are_those_a_slow_count_gives(folders, name):
     assert counts[1:] == fast.tolist() and len(set(fast)) > 1
 
 
-@pytest.mark.parametrize("name", ("cortex-m0plus", "cortex-m4"))
+@pytest.mark.parametrize("name", (pytest.param("cortex-m0plus", marks=pytest.mark.long), "cortex-m4"))
 def test_a_call_costs_what_a_slow_count_gives(tmp_path, name):
     """One by one in Python, from the entry of each call to its return; tune among them."""
     controller = replace(paper_controller(12), tunable=Tunable((0.5, 2.0), (0.0, 1.0), (5.0, 10.0)))
@@ -185,7 +187,15 @@ def test_flash_is_what_the_toolchain_says(folders):
         assert 0 <= exception_index <= 8 * 12 and data + bss == sizes["data"] == 0
 
 
-@pytest.mark.parametrize("name", [one.name for one in CORES])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(
+            one.name, marks=pytest.mark.long if one.name in ("cortex-m3", "cortex-m7", "rv32imac") else ()
+        )
+        for one in CORES
+    ],
+)
 def test_the_stack_that_is_used_is_the_stack_that_is_told(folders, costs, name):
     """Painted memory against paths through machine code: never more, and not much less but for the call that
     mends a damaged state, which these steps do not make.

@@ -78,16 +78,23 @@ def test_whose_kernel_is_a_smaller_cores():
         assert headers and all(own[file] == other[file] for file in headers)
 
 
+SEEDS, LENGTHS = (0, 1, 14, 25, 36), (63, 130, 23, 26, 97)
+
+
 @pytest.mark.parametrize("compiler", CHAINS)
 @pytest.mark.parametrize(
-    ("name", "arithmetic"),
-    [pytest.param(*one, marks=pytest.mark.long if one in ALIKE else ()) for one in OWN],
+    ("name", "arithmetic", "count"),
+    [
+        *((*one, 2) for one in OWN if one not in ALIKE),
+        *(pytest.param(*one, len(SEEDS), marks=pytest.mark.long) for one in OWN),
+    ],
 )
-def test_the_bits_of_the_reference(name, arithmetic, compiler, tmp_path):
-    """Remainders of every unrolled loop, both ends of the ring, resets and tracks."""
+def test_the_bits_of_the_reference(name, arithmetic, count, compiler, tmp_path):
+    """Remainders of every unrolled loop, both ends of the ring, resets and tracks; here two lengths of the
+    five."""
     chain = chain_of(name, compiler)
-    plans = planned(name, arithmetic, (0, 1, 14, 25, 36), (63, 130, 23, 26, 97))
-    assert len(plans) >= 3
+    plans = planned(name, arithmetic, SEEDS, LENGTHS)[:count]
+    assert len(plans) >= min(count, 3)
     library = on_core(name, chain, plans, tmp_path)
     for plan in plans:
         agrees(plan, library, seed=4)
@@ -131,7 +138,10 @@ REACH = {  # cycles of the model a tap, the loop included
 }
 
 
-@pytest.mark.parametrize(("name", "arithmetic"), REACH)
+@pytest.mark.parametrize(
+    ("name", "arithmetic"),
+    [pytest.param(*one, marks=pytest.mark.long if turn % 2 else ()) for turn, one in enumerate(REACH)],
+)
 def test_the_step_is_flat_and_near_the_limit(name, arithmetic, tmp_path):
     """One more past sample costs no more than that, and no step 1.3 times the mean, at L = 1024."""
     plans = [build_plan(paper_controller(length), arithmetic, name=f"l{length}") for length in (64, 1024)]
@@ -151,7 +161,10 @@ FAULTS = {  # in the assembly of each core: what is changed
 }
 
 
-@pytest.mark.parametrize(("name", "arithmetic"), FAULTS)
+@pytest.mark.parametrize(
+    ("name", "arithmetic"),
+    [pytest.param(*one, marks=() if turn % 2 else pytest.mark.long) for turn, one in enumerate(FAULTS)],
+)
 def test_a_fault_in_the_assembly_is_seen(name, arithmetic, tmp_path):
     old, new = FAULTS[name, arithmetic]
     plan = build_plan(paper_controller(78), arithmetic, name="k")

@@ -52,7 +52,9 @@ LOOPS = {  # the body of a loop, its instructions and its cycles, each with the 
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("what", LOOPS)
+@pytest.mark.parametrize(
+    "what", [pytest.param(w, marks=pytest.mark.long if turn % 3 else ()) for turn, w in enumerate(LOOPS)]
+)
 def test_cycles_counted_by_hand(what, tmp_path):
     """Ten more turns of a loop cost ten times its instructions and cycles."""
     name, body, instructions, cycles = LOOPS[what]

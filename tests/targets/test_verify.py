@@ -88,8 +88,16 @@ def covering(plans, name: str, third: int):
     return [p for k, p in enumerate(plans) if (k % kinds + k // kinds + NAMES.index(name)) % 3 == third]
 
 
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("third", (0, *(pytest.param(t, marks=pytest.mark.long) for t in (1, 2))))
+@pytest.mark.parametrize(
+    "third, name",
+    [
+        pytest.param(
+            third, name, marks=pytest.mark.long if third or name in ("cortex-m3", "cortex-m4") else ()
+        )
+        for third in range(3)
+        for name in NAMES
+    ],
+)
 def test_every_arithmetic_agrees_in_every_bit(some, name, third):
     plans, folder = some
     assert len(plans) == 3 * len(ARITHMETICS)
@@ -215,7 +223,12 @@ const void *spba_bytes(uint32_t *size) { return size; }
 
 
 @pytest.mark.parametrize(
-    "name, text, says", [(name, *one) for name, pieces in PIECES.items() for one in pieces]
+    "name, text, says",
+    [
+        pytest.param(name, *one, marks=pytest.mark.long if turn in (2, 4) else ())
+        for name, pieces in PIECES.items()
+        for turn, one in enumerate(pieces)
+    ],
 )
 def test_what_silicon_would_refuse(name, text, says, tmp_path):
     machine = Machine(piece(name, text, tmp_path))
@@ -232,16 +245,16 @@ def test_what_silicon_would_refuse(name, text, says, tmp_path):
     [
         ("cortex-m4", "cortex-m3", ('{ uint32_t a = 1; __asm volatile("smlad %0, %0, %0, %0" : '
          '"+r"(a)); return a; }'), "smlad (DSP extension)"),
-        ("cortex-m4", "cortex-m3", ('{ uint32_t a = 1; __asm volatile("sxtab16 %0, %0, %0" : '
-         '"+r"(a)); return a; }'), "sxtab16 (DSP extension)"),
+        pytest.param("cortex-m4", "cortex-m3", ('{ uint32_t a = 1; __asm volatile("sxtab16 %0, %0, %0" : '
+         '"+r"(a)); return a; }'), "sxtab16 (DSP extension)", marks=pytest.mark.long),
         ("cortex-m4", "cortex-m3", "{ static volatile float x = 2; x = x * x; return 0; }",
          "vmul.f32 (floating-point unit)"),
-        ("cortex-m7", "cortex-m4", "{ static volatile double x = 2; x = x * x; return 0; }",
-         "vmul.f64 (double-precision unit)"),
+        pytest.param("cortex-m7", "cortex-m4", "{ static volatile double x = 2; x = x * x; return 0; }",
+         "vmul.f64 (double-precision unit)", marks=pytest.mark.long),
         ("cortex-m3", "cortex-m0plus", "{ static volatile uint32_t x = 2; return 7u / x; }",
          "udiv (hardware division)"),
-        ("cortex-m3", "cortex-m3", "{ static volatile int8_t x = 2; return (uint32_t)(x * 3); }",
-         None),
+        pytest.param("cortex-m3", "cortex-m3", "{ static volatile int8_t x = 2; return (uint32_t)(x * 3); }",
+         None, marks=pytest.mark.long),
     ],
 )  # fmt: skip
 def test_instructions_that_the_core_does_not_have(built, runs_on, text, says, tmp_path):

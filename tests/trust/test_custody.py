@@ -66,7 +66,9 @@ def test_a_whole_chain_has_nothing_to_say(chain):
     assert read_folder(chain / "fw").notes == ()
 
 
-@pytest.mark.parametrize("name", ("logs/steps.csv", "rig.toml", "identified.toml"))
+@pytest.mark.parametrize(
+    "name", ("logs/steps.csv", pytest.param("rig.toml", marks=pytest.mark.long), "identified.toml")
+)
 def test_any_link_that_does_not_fit_is_named(chain, name, capsys):
     (chain / name).write_bytes((chain / name).read_bytes() + b"\n")
     (note,) = read_folder(chain / "fw").notes
@@ -206,7 +208,13 @@ CHANGES = {  # of a file's bytes, at a place
 }
 
 
-@pytest.fixture(scope="module", params=FOLDERS)
+QUICK = ("plain", "fmu")  # of the packages, the one in which files lie within a file
+
+
+@pytest.fixture(
+    scope="module",
+    params=[name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in FOLDERS],
+)
 def packed(request, tmp_path_factory) -> tuple[Path, dict[str, bytes]]:
     folder = tmp_path_factory.mktemp("packed") / "fw"
     made = controller_from({**tomllib.loads(seeds.controller()[1].decode()), "length": 5})

@@ -16,7 +16,7 @@ from focgen.errors import LogError
 from tests.fuzz import commands, corpus, forked, guidance, mutate, seeds, targets
 from tests.fuzz.campaign import Campaign, Group, supervised
 
-INPUTS, READERS = 300, 25
+INPUTS, READERS = 150, 25
 
 
 def campaign(group: Group, folder: Path | None = None, known=None) -> Campaign:

@@ -49,7 +49,7 @@ def made(tmp_path_factory) -> Path:
 
 
 @killable
-@pytest.mark.parametrize("count", (1, 3))
+@pytest.mark.parametrize("count", [pytest.param(1, marks=pytest.mark.long), 3])
 def test_a_trial_that_is_killed_while_it_is_made_is_made_the_same(made, tmp_path, count):
     killed(make, tmp_path / "t", "sealed/0*/label.json", count)
     assert not (tmp_path / "t" / "trial.json").exists(), "what is not whole is no trial"

@@ -49,7 +49,7 @@ def check(seeds, folder, samples: int) -> int:
     return sum(plan.states > 0 for plan in plans)
 
 
-@pytest.mark.parametrize("seeds", [range(3), pytest.param(range(3, BATCH), marks=pytest.mark.long)])
+@pytest.mark.parametrize("seeds", [range(2), pytest.param(range(2, BATCH), marks=pytest.mark.long)])
 def test_random_controllers_agree_in_every_bit(seeds, tmp_path):
     assert check(seeds, tmp_path, 1600) >= 0.4 * 4 * len(seeds)
 
@@ -60,7 +60,9 @@ def test_many_random_controllers_agree_in_every_bit(batch, tmp_path):
     assert check(range(batch * BATCH, (batch + 1) * BATCH), tmp_path, 10_000) > 0
 
 
-@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+@pytest.mark.parametrize(
+    "arithmetic", ["q31", *(pytest.param(a, marks=pytest.mark.long) for a in ("f64", "f32", "q15"))]
+)
 def test_orders_on_both_sides_of_one_together(arithmetic, tmp_path):
     """Two terms in one polynomial, above and below 1, and the same in the denominator."""
     transfer = TransferFunction([(0.02, 1.4), (0.3, 0.5), (1.0, 0.0)], [(0.004, 1.7), (0.1, 0.9), (1.0, 0.0)])

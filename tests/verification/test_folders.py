@@ -90,8 +90,9 @@ def leaves(entry, path=()):
 @pytest.mark.parametrize(
     "arithmetic, by",
     [
-        *(("q15", 0), ("f32", None), ("f32", "x")),
-        *(pytest.param("f32", by, marks=pytest.mark.long) for by in (-1, float("nan"), [])),
+        ("f32", None),
+        pytest.param("q15", 0, marks=pytest.mark.long),
+        *(pytest.param("f32", by, marks=pytest.mark.long) for by in ("x", -1, float("nan"), [])),
     ],
 )
 def test_no_value_of_the_manifest_may_be_anything_else(sound, tmp_path, arithmetic, by):

@@ -40,7 +40,10 @@ LARGE = simple(
 BOX = Tunable((0.5, 2.0), (0.3, 0.31), (0.35, 0.4))
 
 
-@pytest.mark.parametrize("arithmetic", ["f64", "f32", "q31", "q15"])
+@pytest.mark.parametrize(
+    "arithmetic",
+    [pytest.param("f64", marks=pytest.mark.long), "f32", "q31", pytest.param("q15", marks=pytest.mark.long)],
+)
 def test_limits_ahead_of_which_little_happens_hold(tmp_path, arithmetic):
     """0.3 is no number in single precision; the bound of the signal ahead of the clamp is 10^-5 of that."""
     small = SMALL if arithmetic != "q15" else replace(SMALL, gain=0.1)
@@ -53,13 +56,13 @@ PERCENT = ControllerRanges((0.0, 1.0), (0.0, 1.0), (20.3, 99.9))
 PI = simple(TransferFunction([(2.0, 0.0), (1.0, -0.9)]), length=100, ranges=PERCENT)
 
 
-@pytest.mark.parametrize("arithmetic", ["f64", "f32", "q31"])
+@pytest.mark.parametrize("arithmetic", [pytest.param("f64", marks=pytest.mark.long), "f32", "q31"])
 def test_so_do_those_of_a_controller_that_integrates_by_itself(tmp_path, arithmetic):
     generate(PI, tmp_path, arithmetic)
     assert verify(tmp_path, samples=4000).holds
 
 
-@pytest.mark.parametrize("arithmetic", ["f64", "f32", "q31"])
+@pytest.mark.parametrize("arithmetic", [pytest.param("f64", marks=pytest.mark.long), "f32", "q31"])
 def test_so_do_limits_that_are_tuned(tmp_path, arithmetic):
     generate(replace(SMALL, tunable=BOX), tmp_path, arithmetic, tunable=True)
     assert verify(tmp_path, samples=2000).holds
@@ -80,7 +83,10 @@ def test_an_error_ahead_of_the_clamp_is_still_seen(arithmetic):
     assert seen.operator_share > 1.0 and physical_trace(plan, wrong).u.max() <= 0.4 + plan.output.lsb
 
 
-@pytest.mark.parametrize("arithmetic", ["f64", "f32"])
+@pytest.mark.parametrize(
+    "arithmetic",
+    [pytest.param("f64", marks=pytest.mark.long), "f32"],
+)
 def test_what_is_to_be_refused_is_beyond_the_box_as_the_type_has_it(tmp_path, arithmetic):
     """3.3e10 less 1000 is 3.3e10 in single precision."""
     plan = build_plan(LARGE, arithmetic, tunable=True)

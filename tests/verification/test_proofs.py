@@ -103,7 +103,16 @@ def needs_unicorn() -> None:
     needs(assembly, "unicorn with its companions", "pip install 'focgen[targets]'")
 
 
-@pytest.mark.parametrize("target, arithmetic", assembly.FUNCTIONS)
+SLOW = {
+    ("cortex-m0plus", "q31"),
+    ("cortex-m3", "q15"),
+}  # to follow: each by as many instructions as two others
+
+
+@pytest.mark.parametrize(
+    "target, arithmetic",
+    [pytest.param(*one, marks=pytest.mark.long if one in SLOW else ()) for one in assembly.FUNCTIONS],
+)
 def test_the_assembly_of_a_core(target, arithmetic, tmp_path):
     """Every access is granted by the call, and no data decide on where it goes."""
     needs_unicorn()
@@ -126,7 +135,10 @@ ASSEMBLY_FAULTS = {  # core and arithmetic; behind which instruction, which othe
 }
 
 
-@pytest.mark.parametrize("fault", ASSEMBLY_FAULTS)
+@pytest.mark.parametrize(
+    "fault",
+    [pytest.param(f, marks=pytest.mark.long if turn % 2 else ()) for turn, f in enumerate(ASSEMBLY_FAULTS)],
+)
 def test_a_fault_in_the_assembly_is_caught(fault, tmp_path):
     needs_unicorn()
     name, arithmetic, after, lines, says = ASSEMBLY_FAULTS[fault]
@@ -154,7 +166,7 @@ def test_a_fault_is_caught(fault, tmp_path):
 
 
 @pytest.mark.parametrize("name", (*controllers(8), *tuned(8), *remembering()))
-@pytest.mark.parametrize("arithmetic", ["q15", "q31"])
+@pytest.mark.parametrize("arithmetic", ["q15", pytest.param("q31", marks=pytest.mark.long)])
 def test_every_member_of_a_state_has_its_interval(name, arithmetic, tmp_path):
     """A member that the proofs do not know would be one that nothing is assumed or asked of."""
     ranges = reachable(generated(tmp_path, name, arithmetic, 8))

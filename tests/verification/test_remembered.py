@@ -55,7 +55,10 @@ BENT = [
 ]
 
 
-@pytest.mark.parametrize("key, value", BENT)
+@pytest.mark.parametrize(
+    "key, value",
+    [pytest.param(*b, marks=pytest.mark.long if turn % 2 else ()) for turn, b in enumerate(BENT)],
+)
 @pytest.mark.parametrize("part", ["targets", "previous"])
 def test_a_damaged_memory_is_none(folder, key, value, part):
     entry = entry_of(COST) | {key: value}

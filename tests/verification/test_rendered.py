@@ -54,7 +54,9 @@ def nothing_compiled(monkeypatch):
                 monkeypatch.setattr(module, name, lambda *a, **k: pytest.fail("something is compiled"))
 
 
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize(
+    "form", [pytest.param(f, marks=pytest.mark.long if turn % 2 else ()) for turn, f in enumerate(FORMS)]
+)
 def test_an_untouched_folder_is_what_is_rendered(sound, form):
     read = read_folder(sound / form)
     assert read.differences == () and read.notes == ()
@@ -112,7 +114,9 @@ EDITED = {
 }
 
 
-@pytest.mark.parametrize("what", EDITED)
+@pytest.mark.parametrize(
+    "what", [pytest.param(w, marks=pytest.mark.long if turn % 2 else ()) for turn, w in enumerate(EDITED)]
+)
 def test_what_was_edited_is_named_and_not_compiled(folder, what, nothing_compiled, capsys):
     name, change = EDITED[what]
     change(folder)
@@ -144,7 +148,9 @@ NOTED = {
 }
 
 
-@pytest.mark.parametrize("note", NOTED)
+@pytest.mark.parametrize(
+    "note", [pytest.param(n, marks=pytest.mark.long if turn % 2 else ()) for turn, n in enumerate(NOTED)]
+)
 def test_what_nothing_is_compiled_from_is_a_note(folder, note, capsys):
     NOTED[note](folder)
     assert main(["verify", str(folder), "--samples", "200"]) == 0
@@ -164,7 +170,15 @@ def test_many_strangers_are_counted(folder):
     assert notes[-1] == "22 more files do not belong to the folder"
 
 
-@pytest.mark.parametrize("name", ("stdint.h", "math.h", "stddef.h", "foc_extra.h"))
+@pytest.mark.parametrize(
+    "name",
+    (
+        "stdint.h",
+        pytest.param("math.h", marks=pytest.mark.long),
+        pytest.param("stddef.h", marks=pytest.mark.long),
+        "foc_extra.h",
+    ),
+)
 def test_a_header_laid_beside_takes_no_part(folder, name):
     """The compiler looks for <stdint.h> in the folder, too."""
     (folder / name).write_text("#error this is not the header\n")

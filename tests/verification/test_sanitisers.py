@@ -152,7 +152,10 @@ FAULTS = {
 }
 
 
-@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize(
+    "fault",
+    [pytest.param(f, marks=pytest.mark.long if turn % 2 else ()) for turn, f in enumerate(FAULTS)],
+)
 def test_a_seeded_fault_is_named(fault, tmp_path):
     """The inputs do go where it hurts."""
     command, (file, pattern, by, says) = sanitising("gcc"), FAULTS[fault]
