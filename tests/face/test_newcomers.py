@@ -24,7 +24,10 @@ NEEDS = {"bench.tdms": "nptdms", "bench.mat": "h5py"}
 TOPS = {"bench.mat": ("kPa", 25.0), "blind.csv": (None, None)}
 
 
-@pytest.fixture(params=FILES)
+QUICK = ("bench.csv", "blind.csv", "bench.mat")
+
+
+@pytest.fixture(params=[f if f in QUICK else pytest.param(f, marks=pytest.mark.long) for f in FILES])
 def file(request, tmp_path):
     """A newcomer's file, in a folder with nothing else."""
     pytest.importorskip(NEEDS.get(request.param, "numpy"))

@@ -46,7 +46,9 @@ def truth():
     ],
     ids=["paths", "texts", "dictionaries", "objects", "an iterator"],
 )
-@pytest.mark.parametrize("turned", [False, True], ids=["rig first", "logs first"])
+@pytest.mark.parametrize(
+    "turned", [pytest.param(False, marks=pytest.mark.long), True], ids=["rig first", "logs first"]
+)
 def test_either_order_is_told_by_the_types(rig, logs, turned, truth, recwarn):
     logs = iter([LOG]) if hasattr(logs, "__next__") else logs
     warnings.simplefilter("always")

@@ -88,7 +88,10 @@ def test_nothing_is_computed_before_an_output_is_refused(files, monkeypatch):
         focgen.identify(files["rig.toml"], [files["steps.csv"]], files["rig.toml"])
 
 
-@pytest.mark.parametrize("command", ("identify", "design", "simulate"))
+@pytest.mark.parametrize(
+    "command",
+    ("identify", pytest.param("design", marks=pytest.mark.long), "simulate"),
+)
 def test_a_picture_does_not_replace_an_input(files, command, tmp_path, capsys, monkeypatch):
     """The rig's file bears the name of a picture in the folder that the report goes to."""
     import focgen.cli.design

@@ -130,7 +130,9 @@ def begun(tmp_path):
             os.kill(int(line.split()[0]), signal.SIGKILL)
 
 
-@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(
+    ("number", "status"), [pytest.param(signal.SIGINT, 130, marks=pytest.mark.long), (signal.SIGTERM, 143)]
+)
 def test_an_interrupt_ends_a_compiler_and_what_it_began(begun, tmp_path, number, status):
     begun.send_signal(number)
     said = begun.communicate(timeout=20.0)[1]

@@ -24,7 +24,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize("tolerance", [1e-4, 1e-8])
+@pytest.mark.parametrize("tolerance", [1e-4, pytest.param(1e-8, marks=pytest.mark.long)])
 def test_it_is_the_whole_sum(name, tolerance):
     u = np.random.default_rng(5).normal(size=4000).cumsum()
     whole = GrunwaldLetnikov(CASES[name], 0.01).run(u)

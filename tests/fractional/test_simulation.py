@@ -150,7 +150,7 @@ def test_a_hundred_thousand_samples():
     assert y[samples] == pytest.approx(step_response(model(1.0, 1.32, 0.6), samples * STEP), abs=1e-12)
 
 
-@pytest.mark.parametrize("hold", ["zero", "linear"])
+@pytest.mark.parametrize("hold", [pytest.param("zero", marks=pytest.mark.long), "linear"])
 @pytest.mark.parametrize("order", [0.6, 1.4])
 def test_identification_has_no_bias(hold, order):
     """Noise-free Mittag-Leffler data, N = 2000, h = 10 ms: α comes back to 1e-8 (1e-5 is asked for)."""

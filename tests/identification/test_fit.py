@@ -143,7 +143,8 @@ def test_intervals_cover_the_truth_with_coloured_noise(seeds):
     assert 0.90 <= coverage(0.9, seeds) <= 0.985
 
 
-@pytest.mark.parametrize("seeds", [60, pytest.param(200, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("seeds", [60, 200])
 def test_intervals_cover_the_truth_where_the_pressure_is_noisy_too(seeds):
     """Its first sample alone, for the rest before it, would shift K: 82 % instead of 95 %."""
     clean, hits = chain_log(("pressure", "curvature", "output")), 0
@@ -244,7 +245,7 @@ def between(p: float, q: float) -> Experiment:
     [
         [(0.1, 0.0), (0.15, 0.0), (0.2, 0.0)],
         [(0.0, 0.1), (0.1, 0.0), (0.0, 0.2), (0.2, 0.0)],
-        [(0.05, 0.1), (0.1, 0.2), (0.15, 0.05)],
+        pytest.param([(0.05, 0.1), (0.1, 0.2), (0.15, 0.05)], marks=pytest.mark.long),
     ],
     ids=["releases", "up and down", "between levels"],
 )

@@ -62,7 +62,7 @@ def test_experiments_that_begin_at_rest_have_no_past(seed):
         assert fit.K == pytest.approx(truth, rel=5e-3) and high - low < 0.02 * truth
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_what_a_pulse_before_the_first_sample_left_is_told(seed):
     """Cut while the input rests again and the warmth still goes."""
     rng = np.random.default_rng(seed)

@@ -44,7 +44,11 @@ def test_a_command_that_is_logged_late_is_told_of(roles, late):
     assert "answers the command before it comes; the command logged late" in warning
 
 
-@pytest.mark.parametrize("effect", EFFECTS, ids=str)
+@pytest.mark.parametrize(
+    "effect",
+    [pytest.param(e, marks=pytest.mark.long if turn % 2 else ()) for turn, e in enumerate(EFFECTS)],
+    ids=str,
+)
 def test_what_a_rig_does_late_or_slowly_is_no_such_thing(effect):
     logs = session(2, **effect)
     for part in (logs, logs[:1], logs[2:3], logs[3:4], shifted(logs, -3)):

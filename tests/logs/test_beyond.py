@@ -23,7 +23,17 @@ LOG = {"t": TIME, "p": np.repeat([0.0, 0.1, 0.2], COUNT // 3), "y": 0.01 * np.si
 ROWS = "".join(f"{t:.2f},{p},{y:.6f}\n" for t, p, y in zip(*LOG.values()))
 
 
-@pytest.mark.parametrize("bare", ["\n", "#\n", ",,\n", "\r\n", " \t \n", "\r"])
+@pytest.mark.parametrize(
+    "bare",
+    [
+        "\n",
+        pytest.param("#\n", marks=pytest.mark.long),
+        ",,\n",
+        pytest.param("\r\n", marks=pytest.mark.long),
+        " \t \n",
+        pytest.param("\r", marks=pytest.mark.long),
+    ],
+)
 @pytest.mark.parametrize("name", ["log.csv.gz", "log.lvm.gz"])
 def test_lines_without_a_reading_are_bounded(tmp_path, bare, name):
     path = tmp_path / name

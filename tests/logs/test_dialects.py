@@ -241,7 +241,7 @@ def write_mat_73(path, content):
 
 
 @pytest.mark.parametrize("version", ["5", "7.3"])
-@pytest.mark.parametrize("shape", ["vectors", "struct", "matrix"])
+@pytest.mark.parametrize("shape", ["vectors", pytest.param("struct", marks=pytest.mark.long), "matrix"])
 def test_mat(tmp_path, version, shape):
     from scipy.io import savemat
 

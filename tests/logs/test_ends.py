@@ -38,7 +38,7 @@ def moving(kind: str) -> tuple[np.ndarray, np.ndarray]:
     return made[kind], y
 
 
-@pytest.mark.parametrize("width", (1, 2, 3))
+@pytest.mark.parametrize("width", (1, pytest.param(2, marks=pytest.mark.long), 3))
 @pytest.mark.parametrize("kind", ("rests, moves, rests", "holds", "sine"))
 @pytest.mark.parametrize("size", (0.3, -2.0, 1e9))
 def test_wherever_a_spark_is_it_is_an_outlier(kind, size, width):
@@ -95,7 +95,9 @@ def test_beside_a_hole_a_part_has_ends_as_well(tmp_path):
         assert any(noted(part, "outliers of pressure", f"at {STEP * row:g} s") for part in parts)
 
 
-@pytest.mark.parametrize("rows", (0.0, 0.5, 3.0, 40.0))
+@pytest.mark.parametrize(
+    "rows", (0.0, pytest.param(0.5, marks=pytest.mark.long), 3.0, pytest.param(40.0, marks=pytest.mark.long))
+)
 def test_wherever_an_honest_log_is_cut_its_ends_stay(rows):
     rng = np.random.default_rng(7)
     for seed in range(2):

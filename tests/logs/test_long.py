@@ -113,7 +113,9 @@ ODD = {  # what is to be done to a log, and bytes a row that it may take beside 
 }
 
 
-@pytest.mark.parametrize("what", ODD)
+@pytest.mark.parametrize(
+    "what", [pytest.param(w, marks=pytest.mark.long if turn % 2 else ()) for turn, w in enumerate(ODD)]
+)
 def test_experiments_take_little_beside_their_columns(monkeypatch, what):
     """Ten million rows of three columns: 0.24 GB, and so much again and more while they are looked at."""
     monkeypatch.setattr(outliers, "_PART", 512)

@@ -323,7 +323,7 @@ def test_unknown_and_missing_files_are_refused(tmp_path, rig, capsys, name):
 
 
 @pytest.mark.parametrize("name", ["log.csv.gz", "log.parquet", "log.mat", "log.tdms"])
-@pytest.mark.parametrize("content", ["empty", "text", "cut"])
+@pytest.mark.parametrize("content", ["empty", pytest.param("text", marks=pytest.mark.long), "cut"])
 def test_damaged_files_are_refused(tmp_path, rig, capsys, name, content):
     path = tmp_path / name
     WRITERS[name.partition(".")[2]](path, table())

@@ -61,7 +61,9 @@ def commands(rng: np.random.Generator) -> dict[str, np.ndarray]:
     }
 
 
-@pytest.mark.parametrize("rows", (0.0, 0.5, 3.0, 40.0))
+@pytest.mark.parametrize(
+    "rows", (0.0, pytest.param(0.5, marks=pytest.mark.long), 3.0, pytest.param(40.0, marks=pytest.mark.long))
+)
 def test_nothing_is_told_of_honest_answers(rows):
     for seed in range(4):
         rng = np.random.default_rng(seed)

@@ -313,10 +313,10 @@ def tdms(path, **properties):
 @pytest.mark.parametrize(
     "properties, said",
     [
-        ({"wf_start_offset": 1.0}, "clocks differ"),
-        ({"wf_increment": 0.1}, "clocks differ"),
+        pytest.param({"wf_start_offset": 1.0}, "clocks differ", marks=pytest.mark.long),
+        pytest.param({"wf_increment": 0.1}, "clocks differ", marks=pytest.mark.long),
         ({"wf_xname": "Frequency", "wf_xunit_string": "Hz"}, "goes over Frequency in Hz"),
-        ({"wf_xunit_string": "ms"}, "clocks differ"),
+        pytest.param({"wf_xunit_string": "ms"}, "clocks differ", marks=pytest.mark.long),
     ],
     ids=["another start", "another step", "a spectrum", "another unit"],
 )

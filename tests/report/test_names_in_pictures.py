@@ -15,7 +15,9 @@ NAMES = ("$\\frac{$ x", "$$", "a $b$ c", "\x1b[31m", "%s", "\\", "{", "^_$", "\u
 
 
 @pytest.mark.filterwarnings("ignore:Glyph")
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.long if turn % 2 else ()) for turn, n in enumerate(NAMES)]
+)
 def test_a_name_begins_no_formula(name):
     with figure(1, 1, (2.0, 1.5), squeeze=False) as (fig, grid):
         axes = grid[0, 0]
@@ -27,7 +29,9 @@ def test_a_name_begins_no_formula(name):
 
 
 @pytest.mark.filterwarnings("ignore:Glyph")
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.long if turn % 2 else ()) for turn, n in enumerate(NAMES)]
+)
 def test_a_unit_that_nobody_thought_of_is_no_fault(name):
     """What reaches a label without the rule."""
     with figure(1, 1, (2.0, 1.5), squeeze=False) as (fig, grid):

@@ -49,7 +49,15 @@ def test_a_diagnosis_is_read_back(gap):
 
 
 @pytest.mark.parametrize("file", ["diagnosis.json", "signals.json"])
-@pytest.mark.parametrize("spoil", ["{", "[]", '{"verdict": 1}', "null"])
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        "{",
+        pytest.param("[]", marks=pytest.mark.long),
+        '{"verdict": 1}',
+        pytest.param("null", marks=pytest.mark.long),
+    ],
+)
 def test_what_is_damaged_is_one_line(gap, file, spoil, capsys):
     pytest.importorskip("bokeh")
     (gap / file).write_text(spoil)

@@ -12,7 +12,19 @@ from itertools import pairwise
 from focgen.report.style import figure, sparse_ticks
 
 
-@pytest.mark.parametrize("high", [21.0, 30.0, 70.0, 110.0, 500.0, 1900.0, 2.5e4, 3e8])
+@pytest.mark.parametrize(
+    "high",
+    [
+        21.0,
+        pytest.param(30.0, marks=pytest.mark.long),
+        pytest.param(70.0, marks=pytest.mark.long),
+        pytest.param(110.0, marks=pytest.mark.long),
+        500.0,
+        pytest.param(1900.0, marks=pytest.mark.long),
+        pytest.param(2.5e4, marks=pytest.mark.long),
+        pytest.param(3e8, marks=pytest.mark.long),
+    ],
+)
 def test_labels_of_a_logarithmic_axis_do_not_overlap(high):
     with figure(1, 2, size=(7.6, 3.9)) as (fig, (left, _)):
         left.plot([20.0, high], [1.0, 2.0])

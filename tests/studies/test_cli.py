@@ -28,7 +28,6 @@ OPTIONS = [
     "--lengths",
     "20",
     "100",
-    "500",
     "--tolerances",
     "0.1",
     "0.001",
@@ -82,7 +81,7 @@ def test_the_folder_holds_numbers_pictures_and_a_page(folder):
 def test_every_variant_has_its_row(found):
     short = [r for r in found["rows"] if r["memory"] == "short"]
     assert {(r["arithmetic"], r["length"]) for r in short if r["sample_time"] == 0.01} >= {
-        (a, n) for a in ("f64", "q31") for n in (20, 100, 500)
+        (a, n) for a in ("f64", "q31") for n in (20, 100)
     }
     assert {r["arithmetic"] for r in found["rows"] if r["sample_time"] == 0.02} == {"q31"}
     exponential = [r for r in found["rows"] if r["memory"] == "exponential"]
@@ -135,7 +134,7 @@ def test_the_result_is_dataclasses(folder, found, plainly):
         "memory",
         folder / "controller.toml",
         folder / "out",
-        lengths=(20, 100, 500),
+        lengths=(20, 100),
         tolerances=(0.1, 0.001),
         arithmetic=("f64", "q31"),
         sample_times=(0.01, 0.02),

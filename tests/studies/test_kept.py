@@ -82,7 +82,10 @@ def test_parts_that_do_not_fit_are_refused(folder, tmp_path, damage):
         read_study(tmp_path)
 
 
-@pytest.mark.parametrize("part", ("rows", "ideal", "plant"))
+@pytest.mark.parametrize(
+    "part",
+    (pytest.param("rows", marks=pytest.mark.long), "ideal", pytest.param("plant", marks=pytest.mark.long)),
+)
 def test_points_that_are_none_are_a_gap_of_their_curve(folder, tmp_path, part):
     """What JSON has for NaN, in every curve: once a fault of `report`."""
     shutil.copytree(folder, tmp_path / "study")

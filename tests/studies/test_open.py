@@ -68,7 +68,9 @@ def test_the_exact_output_is_the_whole_sum():
 
 
 @pytest.mark.parametrize("alpha", [0.2, 0.6, 0.95])
-@pytest.mark.parametrize("length", [3, 250, 4000])
+@pytest.mark.parametrize(
+    "length", [pytest.param(3, marks=pytest.mark.long), 250, pytest.param(4000, marks=pytest.mark.long)]
+)
 def test_the_bias_is_gamma_s(alpha, length):
     controller = paper_controller(transfer=TransferFunction([(1.7, alpha), (2.0, 0.0)]))
     found = row(Variant("short", "f64", 0.01, length=length), controller, 300)
@@ -85,16 +87,20 @@ def test_the_bias_is_what_a_constant_leaves_after_hours():
     assert found.dc_bias == pytest.approx(constant, rel=1e-9)
 
 
-def by_turns(seeds):
-    """Seeds and forms of memory; every other pair is in the long suite."""
+def by_turns(seeds, count):
+    """Seeds and forms of memory; every other pair of all but the first ``count`` is in the long suite."""
     return [
-        pytest.param(seed, memory, marks=() if (turn // 4 + turn + i) % 2 == 0 else pytest.mark.long)
+        pytest.param(
+            seed,
+            memory,
+            marks=() if turn < count and (turn // 4 + turn + i) % 2 == 0 else pytest.mark.long,
+        )
         for turn, seed in enumerate(seeds)
         for i, memory in enumerate(("short", "exponential"))
     ]
 
 
-@pytest.mark.parametrize("seed, memory", by_turns(range(12)))
+@pytest.mark.parametrize("seed, memory", by_turns(range(12), 6))
 def test_no_error_exceeds_its_bound(seed, memory):
     random = np.random.default_rng(seed)
     order, length = float(random.uniform(0.05, 1.6)), int(random.integers(2, 300))
@@ -114,7 +120,7 @@ def test_no_error_exceeds_its_bound(seed, memory):
     assert 0.0 < found.error <= found.bound
 
 
-@pytest.mark.parametrize("seed, memory", by_turns([1, 4, 19, 31, 35, 44, 51, 59]))
+@pytest.mark.parametrize("seed, memory", by_turns([1, 4, 19, 31, 35, 44, 51, 59], 4))
 def test_any_controller_can_be_studied(seed, memory):
     """Integrating ones, leads, lags, second order; ranges that differ, or hold errors of one sign only."""
     controller = random_controller(seed)
@@ -208,7 +214,7 @@ def test_multiplies_are_one_a_tap_and_two_an_exponential():
     assert found.multiplies == 2 * found.states + 2 and found.dc_bias == found.operator_bias == 0.0
 
 
-@pytest.mark.parametrize("memory", ["short", "exponential"])
+@pytest.mark.parametrize("memory", [pytest.param("short", marks=pytest.mark.long), "exponential"])
 def test_cycles_and_bytes_are_those_that_cost_counts(tmp_path, memory):
     pytest.importorskip("unicorn")
     variant = Variant(memory, "q31", 0.01, length=40)
@@ -223,7 +229,9 @@ def test_cycles_and_bytes_are_those_that_cost_counts(tmp_path, memory):
     assert found.stack_bytes == counted.stack_bytes and found.compiled_for.startswith("cortex-m4, ")
 
 
-@pytest.mark.parametrize("arithmetic", ["f64", "f32", "q31", "q15"])
+@pytest.mark.parametrize(
+    "arithmetic", ["f32", "q15", *(pytest.param(a, marks=pytest.mark.long) for a in ("f64", "q31"))]
+)
 def test_the_error_of_an_exponential_memory_is_that_of_its_operator(arithmetic):
     """The plan's error, less the rounding of the arithmetic, is the exponentials' by themselves."""
     found = row(Variant("exponential", arithmetic, 0.01, tolerance=0.03, horizon=10_000))
@@ -251,7 +259,7 @@ def test_the_signal_ahead_of_the_integrator_is_hurt_less_than_its_power():
 
 
 @pytest.mark.parametrize("memory", ["short", "exponential"])
-@pytest.mark.parametrize("order", [0.6, 1.4, -0.4])
+@pytest.mark.parametrize("order", [pytest.param(0.6, marks=pytest.mark.long), 1.4, -0.4])
 def test_the_error_against_s_is_that_of_the_weights_and_of_sampling(memory, order):
     """By the sums themselves; a fine memory is left with the delay of order · h / 2 of Grünwald–Letnikov."""
     h, omega = 0.01, np.geomspace(3.0, 0.1 * np.pi / 0.01, 9)

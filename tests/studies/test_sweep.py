@@ -100,7 +100,8 @@ def test_what_is_there_is_not_done_again(done, alone, tmp_path, counted):
     assert not counted
     lost = sorted((tmp_path / "out" / "rows").iterdir())[3]
     lost.write_text('{"half": ')
-    focgen.study("memory", CONTROLLER, tmp_path / "out", jobs=1, **SMALL)
+    with answered_here():
+        focgen.study("memory", CONTROLLER, tmp_path / "out", jobs=1, **SMALL)
     assert [f"{job.key}.json" for job in counted] == [lost.name]
     assert (tmp_path / "out" / "study.json").read_text() == alone
 

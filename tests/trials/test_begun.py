@@ -40,7 +40,14 @@ def interrupted(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "other", [{"seed": 12}, {"cases": 1}, {"signals": "C"}, {"suite": "full"}, {"kinds": ("parameters",)}]
+    "other",
+    [
+        {"seed": 12},
+        pytest.param({"cases": 1}, marks=pytest.mark.long),
+        {"signals": "C"},
+        pytest.param({"suite": "full"}, marks=pytest.mark.long),
+        {"kinds": ("parameters",)},
+    ],
 )
 def test_another_trial_does_not_get_among_its_cases(interrupted, other):
     before = content(interrupted)

@@ -80,7 +80,15 @@ def an_added_rig(trial: Path) -> None:
     (trial / "runs/0001/augmented.toml").write_text("sample_time = 1.0")
 
 
-@pytest.mark.parametrize("how", [another_case, another_verdict, an_edited_word, an_added_rig])
+@pytest.mark.parametrize(
+    "how",
+    [
+        pytest.param(another_case, marks=pytest.mark.long),
+        pytest.param(another_verdict, marks=pytest.mark.long),
+        an_edited_word,
+        pytest.param(an_added_rig, marks=pytest.mark.long),
+    ],
+)
 def test_a_result_that_is_not_of_its_case_is_refused_and_made_anew(trial, how, capsys):
     assert scored(trial) in (0, 1)
     how(trial)

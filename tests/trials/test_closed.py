@@ -100,7 +100,9 @@ def test_fixed_point_gives_whole_counts():
     assert np.allclose(counts, np.round(counts), atol=1e-6) and np.ptp(counts) > 100
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+@pytest.mark.parametrize(
+    "seed", [1, pytest.param(2, marks=pytest.mark.long), 3, pytest.param(4, marks=pytest.mark.long)]
+)
 def test_saturation_stops_at_its_limit(seed):
     free = loop_of(Fault())[1]["command"].max()
     fault = draw_fault("output_saturation", "high", free, np.random.default_rng(seed))
@@ -108,7 +110,9 @@ def test_saturation_stops_at_its_limit(seed):
     assert log["command"].max() == pytest.approx(0.7 * free) and free > 0.7 * free + 0.1
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+@pytest.mark.parametrize(
+    "seed", [1, pytest.param(2, marks=pytest.mark.long), 3, pytest.param(4, marks=pytest.mark.long)]
+)
 def test_jitter_and_losses_show_in_the_time_stamps(seed):
     rng = np.random.default_rng(seed)
     jitter = draw_fault("sample_jitter", "high", 1.5, rng)

@@ -66,7 +66,10 @@ def of_the_trial(folder: Path) -> list[str]:
 
 
 @posix
-@pytest.mark.parametrize(("name", "status", "to_all"), [("SIGINT", 130, True), ("SIGTERM", 143, False)])
+@pytest.mark.parametrize(
+    ("name", "status", "to_all"),
+    [pytest.param("SIGINT", 130, True, marks=pytest.mark.long), ("SIGTERM", 143, False)],
+)
 def test_an_interrupt_ends_it_and_is_no_fault_of_a_case(made, name, status, to_all):
     """Ctrl-C goes to all processes of a terminal, a batch system's signal to the first."""
     process = begun(made)

@@ -313,7 +313,11 @@ def test_form_does_what_the_name_says(effect, form):
     globals()[effect](setting_of(effect, form))
 
 
-@pytest.mark.parametrize("effect, form", ALL, ids=lambda x: getattr(x, "name", x))
+@pytest.mark.parametrize(
+    "effect, form",
+    [pytest.param(*one, marks=pytest.mark.long if turn % 2 else ()) for turn, one in enumerate(ALL)],
+    ids=lambda x: getattr(x, "name", x),
+)
 def test_stages_before_the_effect_do_not_feel_it(effect, form):
     stage = VOCABULARY[effect][0]
     with_, free = (play(e, LEVELS)[0] for e in ([setting_of(effect, form)], []))

@@ -152,7 +152,7 @@ def test_plants_have_the_effects_that_mean_something_there():
         assert force(0.2)[0] == pytest.approx(0.2) and all(p > 0.0 for p in force(0.2))
 
 
-@pytest.mark.parametrize("kind", [MODE, FIRST, SECOND])
+@pytest.mark.parametrize("kind", [MODE, pytest.param(FIRST, marks=pytest.mark.long), SECOND])
 def test_every_form_can_be_weak_on_every_plant(kind):
     """A share of a pressure is no share of a curvature: one such form departed by seven spans."""
     rng = np.random.default_rng(8)

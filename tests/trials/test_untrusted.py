@@ -189,7 +189,9 @@ def mutated(text: str, rng: random.Random) -> bytes:
     return json.dumps(content).encode()
 
 
-@pytest.mark.parametrize("file", ("trial.json", "sealed/0001/label.json"))
+@pytest.mark.parametrize(
+    "file", [pytest.param("trial.json", marks=pytest.mark.long), "sealed/0001/label.json"]
+)
 def test_no_mutation_is_a_traceback(trial, file, capsys):
     """Of 150 of each file every one is either used as it stands or an error of one line."""
     rng = random.Random(f"mutations of {file}")
@@ -225,7 +227,10 @@ RUN = {
 }
 
 
-@pytest.mark.parametrize("file", ("outcome.json", "diagnosis.json", "achieved.json"))
+@pytest.mark.parametrize(
+    "file",
+    ["outcome.json", *(pytest.param(f, marks=pytest.mark.long) for f in ("diagnosis.json", "achieved.json"))],
+)
 def test_no_mutation_of_a_result_is_a_traceback(trial, file, capsys):
     rng = random.Random(f"mutations of {file}")
     run = trial / "runs" / "0001"
