@@ -13,6 +13,7 @@ import numpy as np
 
 from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, innovations
 from focgen.diagnosis.fitting.integrating import settled
+from focgen.diagnosis.problem.problem import Problem
 
 _FOLDS = 4
 _ITERATIONS = 4
@@ -32,7 +33,18 @@ def fitted_to(best: Fit, weighing: Weighing, seen: np.ndarray) -> Fit:
     """A fit made anew to the samples ``seen`` (n,) only. What these do not tell stays as it was."""
     problem = best.problem
     masked = replace(problem, segment=problem.segment.seen_at(seen))
-    return settled(fit(masked, best.vector, weighing, _ITERATIONS))
+    found = settled(fit(masked, best.vector, weighing, _ITERATIONS))
+    vector, own = found.vector.copy(), _not_told(problem, seen)
+    vector[own] = best.vector[own]  # which its prior alone has moved
+    return fit(masked, vector, weighing, 0) if len(own) else found
+
+
+def _not_told(problem: Problem, seen: np.ndarray) -> np.ndarray:
+    """Where in the vector of a ``problem`` the numbers (k,) are that no sample ``seen`` (n,) tells: the zero
+    of an experiment's readings, and what a pump held as it began, where none of its own is among them."""
+    unseen = np.flatnonzero([not np.any(seen[a:b]) for a, b in problem.segment.run.spans])
+    counts = ((problem.zeros, problem.head - problem.stood), (problem.stood, problem.head))
+    return np.concatenate([end - count + unseen for count, end in counts if count] or [unseen[:0]])
 
 
 def foreseen(best: Fit, weighing: Weighing) -> float:

@@ -18,6 +18,7 @@ from focgen.diagnosis.hypotheses.between_samples import between_anew, in_the_end
 from focgen.diagnosis.hypotheses.converter import Converter, converter_of
 from focgen.diagnosis.hypotheses.foretelling import foretelling
 from focgen.diagnosis.hypotheses.left import remembers, unleft
+from focgen.diagnosis.hypotheses.longer_path import borne_out, strays, times_as_long
 from focgen.diagnosis.hypotheses.nuisances import may_be_more, uncertain
 from focgen.diagnosis.hypotheses.rivals import Beside, Cause, Examined, left_out, reexamined
 from focgen.diagnosis.hypotheses.search import Ranking, evidence, rank
@@ -38,9 +39,6 @@ from focgen.rig.rig import Actuator, Rig
 from focgen.rig.session import run_of
 
 _DEPTH = 4
-_KEPT = 10.0  # times the pace at which a rig that integrates is searched where that shows nothing: of a small
-# force the path shows more above the sensor's noise the longer it is kept,
-_HELD = 100.0  # and a pump's for so long first: it adds up without further errors
 _BELIEVED = 6.0  # uncertainties that a number may be off beside an effect: beyond, something else is missing
 
 
@@ -187,12 +185,15 @@ def explain(
     """
     problem = uncertain(rig, segment, logs)
     found = _explained(rig, problem, threshold, only, unsure)
-    for longer in _longer(rig, problem.segment):
-        if not found.causes:
-            path = replace(problem.segment, pace=longer * problem.segment.pace)
-            kept = replace(problem, segment=path, memory={})
-            other = _explained(rig, kept, threshold, only, unsure)
-            problem, found = (kept, other) if _borne_out(other, found) else (problem, found)
+    for times in times_as_long(rig, problem.segment):
+        path = replace(problem.segment, pace=times * problem.segment.pace)
+        kept = replace(problem, segment=path, memory={})
+        if not strays(found.best, kept):
+            continue
+        other = _explained(rig, kept, threshold, only, unsure)
+        if borne_out(other.best, found.best, found.nominal, Weighing(found.ar)):
+            problem, found = kept, other
+            break
     if not found.strained or problem.nominals.far or found.predictability.share < NUMBERS.left:
         return found
     freed, asked = (
@@ -204,23 +205,6 @@ def explain(
         return found
     other = _explained(rig, freed, threshold, only, unsure)
     return other if other.square < asked else found
-
-
-def _longer(rig: Rig, segment: Segment) -> tuple[float, ...]:
-    """Times the pace at which a segment is searched where that shows nothing."""
-    if not segment.pace:
-        return ()
-    return (_HELD, _KEPT) if rig.integrator == "regulator" else (_KEPT,)
-
-
-def _borne_out(kept: Explanation, usual: Explanation) -> bool:
-    """Whether what a longer path shows is seen a little at the usual pace, too: what an input was measured
-    wrong adds up in the path, and no force is behind it."""
-    candidates = kept.best.problem.candidates
-    if not kept.causes:
-        return False
-    beside, weighing = usual.nominal.problem.with_candidates(candidates), Weighing(usual.ar)
-    return evidence(fit(beside, kept.best.vector, weighing, 12), usual.nominal) > 0.0
 
 
 def _explained(
