@@ -1,4 +1,7 @@
-"""Where a stage that integrates stood, told without telling the pasts of experiments anew."""
+"""Where a stage that integrates stood, told without telling the pasts of experiments anew.
+
+Red when a run that stood elsewhere has other pasts than one whose pasts are told from the start.
+"""
 
 from dataclasses import replace
 

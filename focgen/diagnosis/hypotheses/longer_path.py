@@ -1,5 +1,5 @@
-"""A rig that adds up is judged by the recent part of its path: what an input was measured wrong adds up in all
-of it. What is small, or lasts for a moment, shows in a longer part first."""
+"""A rig that adds up is judged by the recent part of its path: in all of it, what an input was measured wrong
+adds up. What is small, or lasts for a moment, shows in a longer part first."""
 
 from __future__ import annotations
 
