@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 from focgen.diagnosis.fitting.fit import WHITE, Fit, Weighing, fit
-from focgen.diagnosis.fitting.folds import folds, foreseen, foretold
+from focgen.diagnosis.fitting.folds import fitted_to, folds, foreseen, foretold
 from focgen.diagnosis.hypotheses import rivals
 from focgen.diagnosis.hypotheses.foretelling import foretelling
-from focgen.diagnosis.hypotheses.nuisances import problem_of
+from focgen.diagnosis.hypotheses.initial import begun_session
+from focgen.diagnosis.hypotheses.nuisances import problem_of, uncertain
 from focgen.diagnosis.hypotheses.search import evidence
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
 from focgen.diagnosis.problem.segments import make
@@ -23,6 +24,8 @@ from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import library
 from focgen.rig.rig import LinearActuator, Rig, Signals
+from tests.diagnosis.test_held import RIG as PUMP
+from tests.diagnosis.test_pumps import session as pump_session
 
 H, NOISE, TOPS = 0.05, 0.05, (2.0, 3.0, 4.0, 6.0, 6.0)
 LAG = TransferFunction([(6.0, 0.0)], [(2.0, 1.0), (1.0, 0.0)])
@@ -118,3 +121,18 @@ def test_a_fit_foretells_what_it_made_least(seed):
     best = fit(plain.problem, plain.vector, colour, 12)
     assert foretold(best, colour) < 1.05 * np.mean(best.innovations**2)
     assert foreseen(best, colour) > 1.2 * np.mean(best.weighed**2)
+
+
+def test_a_fold_keeps_what_only_the_unseen_tells():
+    """Where a pump stood as a log began is told by that log alone. Its prior moved that to where the begin
+    had told it, and a fit that did not see the log foretold nothing of it."""
+    logs = [log.between(1.2 + 1.1 * n, 45.0) for n, log in enumerate(pump_session(1))]
+    bare = [replace(log, signals={n: log[n] for n in ("command", "output")}) for log in logs]
+    bare = begun_session(PUMP, bare)
+    problem = uncertain(PUMP, make(bare, "command", "output"), bare)
+    assert problem.stood == 2
+    vector = problem.nominal()
+    vector[problem.head - 2 : problem.head] = 0.7
+    first = np.arange(len(problem.segment.y)) < problem.segment.run.spans[0][1]
+    found = fitted_to(fit(problem, vector, WHITE, 0), WHITE, first)
+    assert found.vector[problem.head - 1] == 0.7 != found.vector[problem.head - 2]
