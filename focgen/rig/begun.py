@@ -42,28 +42,33 @@ def from_there(x: Array, run: Run) -> Array:
     return made
 
 
+def alone(run: Run) -> tuple[bool, ...]:
+    """Which experiments of a run do not go on from the one ahead of them."""
+    return _told(run).alone if run.begins else (True,) * len(run.spans)
+
+
 def past_of(run: Run) -> tuple[Run, Array]:
     """The run with the pasts of its experiments, and where (n,) the samples of the experiments are in it."""
     told = _told(run)
     return told.whole, told.kept
 
 
-def standing(run: Run, stands: tuple[float, ...]) -> Run:
+def with_stands(run: Run, stands: tuple[float, ...]) -> Run:
     """The run whose stage that integrates stood at ``stands`` as each experiment began. Its pasts are
     those of ``run``, and are not told anew."""
-    made = run.standing(stands)
+    made = run.with_stands(stands)
     if run.begins:
         told = _told(run)
         own = tuple(place for place, alone in zip(stands, told.alone) if alone)
-        _TOLD[made] = replace(told, whole=told.whole.standing(own))
+        _TOLD[made] = replace(told, whole=told.whole.with_stands(own))
     return made
 
 
 @dataclass(frozen=True, eq=False)
 class _Told:
-    """A run's pasts: each with by how much of a sample its pause ends sooner, 0 where it is none; which
-    experiments have one of their own, ``alone``; the ``whole`` run with the pasts, and where (n,) the
-    samples of the experiments are in it."""
+    """A run's pasts: each with by how much of a sample its pause ends sooner, 0 where it is none. ``alone``:
+    which experiments have one of their own. ``whole``: the run with the pasts. ``kept`` (n,): where in that
+    the samples of the experiments are."""
 
     pasts: tuple[tuple[Array, float], ...]
     alone: tuple[bool, ...]

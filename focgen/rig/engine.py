@@ -74,7 +74,7 @@ class Chain:
                 own = before if remembers else run
                 if left is not None and placed is not None:
                     left[_index(self.placed, placed)] = placed.leaves(x, own)
-                x = self._once((stage, number), key, x, act, own)
+                x = self._once((stage, number), (key, _stands(placed, own)), x, act, own)
                 if remembers or (placed is None and stage in keeps):
                     run = behind
             if run.stands and stage == self.rig.integrator:
@@ -169,6 +169,11 @@ def between_of(rig: Rig, entry: str) -> Between:
     regulator is held, as converters do, and what else there is runs in straight lines."""
     held = entry == "command" and rig.regulator != UNITY
     return (Between.HELD if held else Between.STRAIGHT) if rig.between is None else rig.between
+
+
+def _stands(placed: Placed | None, run: Run) -> tuple[float, ...]:
+    """Where a pump stood, for an effect that acts by that: beside its signal, its result depends on it."""
+    return run.stands if placed is not None and placed.form.adds_up else ()
 
 
 def _effect(placed: Placed) -> Step:

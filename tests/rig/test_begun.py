@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from focgen.logs.begin import Begin
-from focgen.rig.begun import past_of, standing, with_past
+from focgen.rig.begun import past_of, with_past, with_stands
 from focgen.rig.effects import Run
 
 H = 0.1
@@ -23,7 +23,7 @@ def test_where_it_stood_changes_no_past(second, starts):
     run = Run.of([40, 30], starts, H, [ALONE, second], stands=[2.0, -1.0])
     x = np.linspace(1.0, 2.0, 70)
     past_of(run)
-    moved = standing(run, (5.0, 0.5))
+    moved = with_stands(run, (5.0, 0.5))
     anew = replace(run, stands=(5.0, 0.5))
 
     (whole, kept), (expected, where) = past_of(moved), past_of(anew)

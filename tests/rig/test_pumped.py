@@ -194,20 +194,8 @@ MOST, PACE = 0.6 * np.max(np.abs(FLOW)), 0.5 * np.max(np.abs(FLOW))
     "less, asked, rate, gap",
     [
         (("flow_limit", "driven", MOST), lambda q: np.clip(q, -MOST, MOST), float, 0.0),
-        pytest.param(
-            ("flow_limit", "spent", PACE),
-            float,
-            lambda v: np.clip(v, -PACE, PACE),
-            0.0,
-            marks=pytest.mark.long,
-        ),
-        pytest.param(
-            ("valve_asymmetry", "back", 0.9),
-            float,
-            lambda v: v * (0.9 if v < 0.0 else 1.0),
-            0.0,
-            marks=pytest.mark.long,
-        ),
+        (("flow_limit", "spent", PACE), float, lambda v: np.clip(v, -PACE, PACE), 0.0),
+        (("valve_asymmetry", "back", 0.9), float, lambda v: v * (0.9 if v < 0.0 else 1.0), 0.0),
         (("valve_stiction", "lost_motion", 0.4), float, float, 0.4),
     ],
     ids=["driver", "speed", "way", "spindle"],
@@ -252,6 +240,33 @@ def test_a_spindle_lies_as_what_moved_the_piston_between_two_logs_left_it(way):
     whole = way * 20 * H * 3.0
     expected = [way * 20.0, way * 20.0 + whole, -way * 20.0, -way * 20.0 + whole - way * 0.8]
     np.testing.assert_allclose(made[[30, 59, 60, 89]], expected, atol=0.02)
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        ("valve_stiction", "lost_motion", 0.4),
+        ("leak", "running_out", 0.05),
+        ("supply_saturation", "spilt", 9.0),
+    ],
+    ids=lambda effect: effect[1],
+)
+def test_a_chain_that_remembers_asks_where_a_pump_stood(effect):
+    """Red when a fit gets what an effect made of the pump where it stood before."""
+    pump = replace(RIGS["whole"], regulator=TransferFunction([(1.0, 0.0)], [(1.0, 1.0)]))
+    flow, run = (
+        np.tile(np.asarray(FLOW, float), 2),
+        Run.of([len(FLOW)] * 2, [0.0, 99.0], H, stands=[0.0, 2.6]),
+    )
+    memory: dict = {}
+    for stands in ((0.0, 60.0), (0.0, -7.0)):
+        made = [
+            Chain(pump, (placed(*effect),), remember).run(
+                flow, "regulator", "regulator", replace(run, stands=stands)
+            )
+            for remember in (memory, None)
+        ]
+        np.testing.assert_array_equal(*made)
 
 
 def test_a_volume_is_told_through_a_curve():

@@ -11,9 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, innovations
+from focgen.diagnosis.fitting.fit import WHITE, Fit, Weighing, fit, innovations
 from focgen.diagnosis.fitting.integrating import settled
 from focgen.diagnosis.problem.problem import Problem
+from focgen.rig.begun import alone
 
 _FOLDS = 4
 _ITERATIONS = 4
@@ -30,25 +31,31 @@ def folds(lengths: Sequence[int]) -> np.ndarray:
 
 
 def fitted_to(best: Fit, weighing: Weighing, seen: np.ndarray) -> Fit:
-    """A fit made anew to the samples ``seen`` (n,) only. What these do not tell stays as it was."""
+    """A fit made anew to the samples ``seen`` (n,) only. What these do not tell stays as it was, for a prior
+    alone would move it."""
     problem = best.problem
     masked = replace(problem, segment=problem.segment.seen_at(seen))
     found = settled(fit(masked, best.vector, weighing, _ITERATIONS))
     vector, own = found.vector.copy(), _not_told(problem, seen)
-    vector[own] = best.vector[own]  # which its prior alone has moved
-    return fit(masked, vector, weighing, 0) if len(own) else found
+    vector[own] = best.vector[own]
+    return fit(masked, vector, WHITE if problem.segment.pace else weighing, 0) if len(own) else found
 
 
 def _not_told(problem: Problem, seen: np.ndarray) -> np.ndarray:
-    """Where in the vector of a ``problem`` the numbers (k,) are that no sample ``seen`` (n,) tells: the zero
-    of an experiment's readings, and what a pump held as it began, where none of its own is among them."""
-    unseen = np.flatnonzero([not np.any(seen[a:b]) for a, b in problem.segment.run.spans])
-    counts = ((problem.zeros, problem.head - problem.stood), (problem.stood, problem.head))
-    return np.concatenate([end - count + unseen for count, end in counts if count] or [unseen[:0]])
+    """Where in the vector (k,) the numbers are that no sample ``seen`` (n,) tells. The zero of an
+    experiment's readings is told by its own. What a pump held as it began is told by those of the experiments
+    that go on from it as well."""
+    run = problem.segment.run
+    shown = np.array([bool(np.any(seen[a:b])) for a, b in run.spans])
+    behind = np.cumsum(alone(run))
+    held = problem.head - problem.stood + np.flatnonzero(~np.isin(behind, behind[shown]))
+    zeros = problem.head - problem.stood - problem.zeros + np.flatnonzero(~shown)
+    return np.concatenate([zeros if problem.zeros else zeros[:0], held if problem.stood else held[:0]])
 
 
 def foreseen(best: Fit, weighing: Weighing) -> float:
-    """The mean square error of a segment whose every part is simulated by a fit to the others."""
+    """The mean square error of a segment whose every part is simulated by a fit to the others, but for what
+    only that part tells."""
     return _foreseen(best, weighing, best.problem.weighed)
 
 

@@ -18,7 +18,7 @@ from focgen.diagnosis.hypotheses.between_samples import between_anew, in_the_end
 from focgen.diagnosis.hypotheses.converter import Converter, converter_of
 from focgen.diagnosis.hypotheses.foretelling import foretelling
 from focgen.diagnosis.hypotheses.left import remembers, unleft
-from focgen.diagnosis.hypotheses.longer_path import borne_out, strays, times_as_long
+from focgen.diagnosis.hypotheses.longer_path import borne_out, may_show_more, times_as_long
 from focgen.diagnosis.hypotheses.nuisances import may_be_more, uncertain
 from focgen.diagnosis.hypotheses.rivals import Beside, Cause, Examined, left_out, reexamined
 from focgen.diagnosis.hypotheses.search import Ranking, evidence, rank
@@ -188,10 +188,10 @@ def explain(
     for times in times_as_long(rig, problem.segment):
         path = replace(problem.segment, pace=times * problem.segment.pace)
         kept = replace(problem, segment=path, memory={})
-        if not strays(found.best, kept):
+        if not may_show_more(found.best, kept, only):
             continue
         other = _explained(rig, kept, threshold, only, unsure)
-        if borne_out(other.best, found.best, found.nominal, Weighing(found.ar)):
+        if borne_out(other.best, found.best, found.nominal.problem, Weighing(found.ar)):
             problem, found = kept, other
             break
     if not found.strained or problem.nominals.far or found.predictability.share < NUMBERS.left:

@@ -3,6 +3,8 @@ adds up. What is small, or lasts for a moment, shows in a longer part first."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from focgen.diagnosis.fitting.fit import WHITE, Fit, Weighing, fit
 from focgen.diagnosis.hypotheses.search import evidence
 from focgen.diagnosis.numbers import NUMBERS
@@ -23,19 +25,23 @@ def times_as_long(rig: Rig, segment: Segment) -> tuple[float, ...]:
     return (_HELD, _KEPT) if rig.integrator == "regulator" else (_KEPT,)
 
 
-def strays(best: Fit, kept: Problem) -> bool:
+def may_show_more(best: Fit, kept: Problem, only: Sequence[str] | None) -> bool:
     """Whether nothing was found at the usual pace, or inputs predict much of what effects leave of a longer
-    path, as it is ``kept``."""
-    if not best.problem.candidates:
-        return True
-    beside = kept.with_candidates(best.problem.candidates)
-    return fit(beside, best.vector, WHITE, _ITERATIONS).predictable_share > NUMBERS.much
+    path, as it is ``kept``; ``only``: the effects to consider, which may all have been found."""
+    found = best.problem.families
+    if not found or (only is not None and set(only) <= set(found)):
+        return not found
+    return _refitted(best, kept, WHITE).predictable_share > NUMBERS.much
 
 
-def borne_out(shown: Fit, best: Fit, nominal: Fit, weighing: Weighing) -> bool:
-    """Whether what a longer path has ``shown`` beside the ``best`` at the usual pace is seen a little there,
-    too: what an input was measured wrong adds up in the path, and no force is behind it."""
+def borne_out(shown: Fit, best: Fit, usual: Problem, weighing: Weighing) -> bool:
+    """Whether what a longer path has ``shown`` beside the ``best`` of the ``usual`` one is seen a little
+    there, too: what an input was measured wrong adds up in the path, and no force is behind it."""
     if not set(best.problem.families) < set(shown.problem.families):
         return False
-    beside = nominal.problem.with_candidates(shown.problem.candidates)
-    return evidence(fit(beside, shown.vector, weighing, _ITERATIONS), best) > 0.0
+    return evidence(_refitted(shown, usual, weighing), _refitted(best, usual, weighing)) > 0.0
+
+
+def _refitted(of: Fit, problem: Problem, weighing: Weighing) -> Fit:
+    """The effects of a fit in another ``problem``."""
+    return fit(problem.with_candidates(of.problem.candidates), of.vector, weighing, _ITERATIONS)

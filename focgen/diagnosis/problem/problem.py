@@ -14,7 +14,7 @@ from focgen.diagnosis.problem.excitation import excitation
 from focgen.diagnosis.problem.held import may_have_held, tells_what_is_held
 from focgen.diagnosis.problem.nominal_parameters import NominalParameters
 from focgen.diagnosis.problem.segments import Segment
-from focgen.rig.begun import standing
+from focgen.rig.begun import with_stands
 from focgen.rig.effects import Effect, Excitation, Form, Parameter, Run, library
 from focgen.rig.engine import Chain
 from focgen.rig.placed import Placed, slot_in
@@ -271,9 +271,10 @@ class Problem:
         chain = Chain(self.rig(vector), self.placed(vector), self.memory, probe)
         own, segment = len(self.nominal_start), self.segment
         gauges, off, begun, zeros, stood = self._parted(vector[own + 1 : self.head])
+        run = self._begun(stood, probe)
         x = self._entered(float(vector[own]), off, probe)
         with np.errstate(over="ignore", invalid="ignore"):
-            made = chain.run(x, segment.stages[0], segment.stages[-1], self._begun(stood), segment.between)
+            made = chain.run(x, segment.stages[0], segment.stages[-1], run, segment.between)
         made = self._read(made if segment.readings is None else made[segment.readings], *gauges)
         made = made + self._kept("loose", begun, segment.loose.__matmul__, probe) if begun.any() else made
         return made + self._kept("zeros", zeros, self._uneven, probe) if zeros.any() else made
@@ -310,14 +311,14 @@ class Problem:
         ends = np.cumsum([0, len(self.gauges), ways, self.ways - ways, self.zeros, self.stood])
         return tuple(pairwise(ends.tolist()))
 
-    def _begun(self, stood: np.ndarray) -> Run:
+    def _begun(self, stood: np.ndarray, probe: bool) -> Run:
         """The run, with what a pump held as each experiment began off by so many standard deviations; the
         same object where that is as lately, by which its pasts are told once."""
         run = self.segment.fed.run
         if not stood.any():
             return run
-        begun = partial(standing, run, self._held(stood))
-        return self._lately("stood", stood.tobytes(), run, begun)
+        begun = partial(with_stands, run, self._held(stood))
+        return self._lately("begun", stood.tobytes(), run, begun, probe)
 
     def zero(self, vector: np.ndarray) -> float:
         """What the output reads where nothing moves, in the log's unit; 0 where the rig has an offset."""

@@ -105,7 +105,7 @@ class Run:
         rest[later[rest[later] == 1]] = 0
         return replace(self, rest=rest)
 
-    def standing(self, stands: tuple[float, ...]) -> Run:
+    def with_stands(self, stands: tuple[float, ...]) -> Run:
         """The run whose stage that integrates stood at ``stands`` as each experiment began."""
         return self._resting(self.rest, stands)
 
