@@ -224,30 +224,7 @@ def planned(controller, arithmetic):
 
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
 @pytest.mark.parametrize(
-    "seed",
-    [
-        0,
-        1,
-        2,
-        3,
-        4,
-        5,
-        6,
-        7,
-        8,
-        9,
-        10,
-        11,
-        12,
-        13,
-        14,
-        15,
-        16,
-        17,
-        18,
-        19,
-        *(pytest.param(s, marks=pytest.mark.long) for s in range(20, 40)),
-    ],
+    "seed", [*range(20), *(pytest.param(s, marks=pytest.mark.long) for s in range(20, 40))]
 )
 def test_reference_equals_the_description(seed, arithmetic):
     controller = random_controller(seed, longest=24)

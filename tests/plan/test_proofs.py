@@ -101,40 +101,7 @@ def test_blocks_far_below_the_total_are_made_coarser_rather_than_shifted_out_of_
 
 @pytest.mark.parametrize("arithmetic", FIXED)
 @pytest.mark.parametrize(
-    "seed",
-    [
-        0,
-        1,
-        2,
-        3,
-        4,
-        5,
-        6,
-        7,
-        8,
-        9,
-        10,
-        11,
-        12,
-        13,
-        14,
-        15,
-        16,
-        17,
-        18,
-        19,
-        20,
-        21,
-        22,
-        23,
-        24,
-        25,
-        26,
-        27,
-        28,
-        29,
-        *(pytest.param(s, marks=pytest.mark.long) for s in range(30, 60)),
-    ],
+    "seed", [*range(30), *(pytest.param(s, marks=pytest.mark.long) for s in range(30, 60))]
 )
 def test_formats_hold_what_the_ranges_say(seed, arithmetic):
     plan = planned(seed, arithmetic)
