@@ -120,7 +120,7 @@ class Run:
         """The run behind what remembers, whose input is ``x`` (n,): a later experiment that begins with an
         input of 0 begins in equilibrium with what that makes of it."""
         later = self._later_from_rest
-        if self.stands or not len(later):
+        if any(self.stands) or not len(later):
             return self
         return self._in_equilibrium(x, later, 0.0)
 
