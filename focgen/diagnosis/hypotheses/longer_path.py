@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from focgen.diagnosis.fitting.fit import WHITE, Fit, Weighing, fit
 from focgen.diagnosis.hypotheses.search import evidence
 from focgen.diagnosis.numbers import NUMBERS
@@ -36,10 +38,15 @@ def may_show_more(best: Fit, kept: Problem, only: Sequence[str] | None) -> bool:
 
 def borne_out(shown: Fit, best: Fit, usual: Problem, weighing: Weighing) -> bool:
     """Whether what a longer path has ``shown`` beside the ``best`` of the ``usual`` one is seen a little
-    there, too: what an input was measured wrong adds up in the path, and no force is behind it."""
+    there, too: what an input was measured wrong adds up in the path, and no force is behind it. By itself it
+    has to foretell (Akaike, 1974). Beside another, of which it may follow what a form lacks, it has to be
+    evident (Schwarz, 1978)."""
     if not set(best.problem.families) < set(shown.problem.families):
         return False
-    return evidence(_refitted(shown, usual, weighing), _refitted(best, usual, weighing)) > 0.0
+    without, beside = (_refitted(of, usual, weighing) for of in (best, shown))
+    further, n = beside.size - without.size, len(beside.innovations)
+    allowed = further * (0.5 * np.log(n) - 1.0) if not best.problem.families else 0.0
+    return evidence(beside, without) + allowed > 0.0
 
 
 def _refitted(of: Fit, problem: Problem, weighing: Weighing) -> Fit:
