@@ -28,10 +28,11 @@ def times_as_long(rig: Rig, segment: Segment) -> tuple[float, ...]:
 
 
 def may_show_more(best: Fit, kept: Problem, only: Sequence[str] | None) -> bool:
-    """Whether nothing was found at the usual pace, or inputs predict much of what effects leave of a longer
-    path, as it is ``kept``; ``only``: the effects to consider, which may all have been found."""
-    found = best.problem.families
-    if not found or (only is not None and set(only) <= set(found)):
+    """Whether nothing was found at the usual pace, or inputs predict much of what effects leave of a pump's
+    longer path, as it is ``kept``: of an axis what inputs were measured wrong would do as well. ``only``: the
+    effects to consider, which may all have been found."""
+    found, pumped = best.problem.families, kept.nominals.rig.integrator == "regulator"
+    if not found or not pumped or (only is not None and set(only) <= set(found)):
         return not found
     return _refitted(best, kept, WHITE).predictable_share > NUMBERS.much
 
