@@ -59,8 +59,8 @@ def with_stands(run: Run, stands: tuple[float, ...]) -> Run:
     made = run.with_stands(stands)
     if run.begins:
         told = _told(run)
-        own = tuple(place for place, alone in zip(stands, told.alone) if alone)
-        _TOLD[made] = replace(told, whole=told.whole.with_stands(own))
+        kept = tuple(place for place, own in zip(stands, told.alone) if own)
+        _TOLD[made] = replace(told, whole=told.whole.with_stands(kept))
     return made
 
 
@@ -102,11 +102,11 @@ def _tell(run: Run) -> _Told:
         for part in (run.clock[a] - h * np.arange(len(past), 0, -1), run.clock[a:b])
     ]
     kept = [s + len(past) + np.arange(n) for s, past, n in zip(starts, pasts, lengths)]
-    alone = tuple(gap is None for gap in gaps)
-    stands = tuple(place for place, own in zip(run.stands, alone) if own)
+    by_itself = tuple(gap is None for gap in gaps)
+    stands = tuple(place for place, own in zip(run.stands, by_itself) if own)
     long = replace(run, rest=rest, clock=np.concatenate(clock), begins=(), stands=stands)
     duration = max(run.duration, h * max(b - a for a, b in long.spans))
-    return _Told(tuple(zip(pasts, sooner)), alone, replace(long, duration=duration), np.concatenate(kept))
+    return _Told(tuple(zip(pasts, sooner)), by_itself, replace(long, duration=duration), np.concatenate(kept))
 
 
 def _gaps(run: Run) -> list[float | None]:

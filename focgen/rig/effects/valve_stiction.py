@@ -32,8 +32,8 @@ def _play(x: Array, values: Values, run: Run) -> Array:
 
 def _lost_motion(x: Array, values: Values, run: Run) -> Array:
     """A pump's piston, whose spindle lies in its gap as the log before left it. Where the piston stands
-    elsewhere by now, the spindle has pushed it there, and is ahead of it. By no more than it has moved: where
-    it stood is told from noisy readings."""
+    elsewhere by now, the spindle has pushed it there, and is ahead of it, by no more than it has moved. Noisy
+    readings tell where it stood."""
     (band,), made = values, np.empty(len(x))
     behind, ended = 0.0, None  # what the piston is behind its spindle; where it was as the log before ended
     for a, b, stood in run.stood_by_span:
