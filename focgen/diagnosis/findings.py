@@ -10,7 +10,7 @@ from itertools import islice, pairwise
 
 import numpy as np
 
-from focgen.diagnosis.fitting.fit import Fit
+from focgen.diagnosis.fitting.fit import Fit, Weighing
 from focgen.diagnosis.fitting.predictability import predicted
 from focgen.diagnosis.hypotheses.bootstrap import threshold as bootstrapped
 from focgen.diagnosis.hypotheses.explain import (
@@ -29,6 +29,7 @@ from focgen.diagnosis.hypotheses.initial import (
     rested_long,
 )
 from focgen.diagnosis.hypotheses.input_covariance import input_covariance
+from focgen.diagnosis.hypotheses.longer_path import on_the_path_of
 from focgen.diagnosis.hypotheses.roughly import alone, families_in, leaves_less_beside, suits_what_is_slow
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.segments import cuts, make
@@ -111,7 +112,7 @@ class _Search:
     ) -> tuple[Explanation, ...] | None:
         """The findings of the session as it is now, where they leave less than those so far."""
         again = explain_all(self.nominal, session, NUMBERS.nats, self.only, self.bootstrap)
-        return again if _left_by(again) < _left_by(explanations) else None
+        return again if _left_by(again, explanations) < _left_by(explanations, again) else None
 
 
 def _rested(
@@ -273,12 +274,14 @@ def _begin_elsewise(logs: Sequence[Experiment], session: Sequence[Experiment]) -
     return [log.begins for log in logs] != [log.begins for log in session]
 
 
-def _left_by(explanations: Sequence[Explanation]) -> float:
-    """What explanations leave, in nats, and what their numbers cost (Schwarz's approximation)."""
+def _left_by(explanations: Sequence[Explanation], others: Sequence[Explanation]) -> float:
+    """What explanations leave, in nats, and what their numbers cost (Schwarz's approximation), on paths no
+    longer than those of the ``others``."""
     spent = 0.0
-    for e in explanations:
-        count = len(e.best.weighed)
-        spent += 0.5 * count * float(np.log(e.square)) + 0.5 * e.best.size * float(np.log(count))
+    for e, other in zip(explanations, others, strict=True):
+        left = on_the_path_of(other.best, e.best, Weighing(other.ar)).weighed
+        count = len(left)
+        spent += 0.5 * count * float(np.log(np.mean(left**2))) + 0.5 * e.best.size * float(np.log(count))
     return spent
 
 

@@ -4,6 +4,7 @@ adds up. What is small, or lasts for a moment, shows in a longer part first."""
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -48,6 +49,16 @@ def borne_out(shown: Fit, best: Fit, usual: Problem, weighing: Weighing) -> bool
     further, n = beside.size - without.size, len(beside.innovations)
     allowed = further * (0.5 * np.log(n) - 1.0) if not best.problem.families else 0.0
     return evidence(beside, without) + allowed > 0.0
+
+
+def on_the_path_of(other: Fit, of: Fit, weighing: Weighing) -> Fit:
+    """A fit on the path of an ``other`` one, where its own is longer: what is kept longer adds up to more, so
+    that two paths of unlike length cannot be compared."""
+    pace = other.problem.segment.pace
+    if of.problem.segment.pace <= pace:
+        return of
+    usual = replace(of.problem, segment=replace(of.problem.segment, pace=pace), memory={})
+    return fit(usual, of.vector, weighing, _ITERATIONS)
 
 
 def _refitted(of: Fit, problem: Problem, weighing: Weighing) -> Fit:
