@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from focgen.diagnosis.fitting.fit import Fit, Known, Weighing, fit
 from focgen.diagnosis.hypotheses.nuisances import ways
 from focgen.diagnosis.hypotheses.rivals import Rival
 from focgen.diagnosis.numbers import NUMBERS
+from focgen.diagnosis.problem.problem import Problem
 from focgen.diagnosis.problem.segments import Segment
 from focgen.rig.rig import Rig
 
@@ -33,9 +36,19 @@ def between_anew(rig: Rig, best: Fit, nominal: Fit, weighing: Weighing) -> tuple
 def moved_to(of: Fit, segment: Segment, weighing: Weighing, known: Known | None = None) -> Fit:
     """A fit made anew to another account of its segment; ``known``: its Jacobian, taken as it was."""
     problem = replace(of.problem, segment=segment, memory={})
-    start = of.vector.copy()
+    start = _with_stands(of, problem)
     start[len(problem.nominal_start)] = 0.0  # the alignment made up for the wrong way
-    return fit(problem, start, weighing, 8, known=known)
+    return fit(problem, start, weighing, 8, known=known if len(start) == len(of.vector) else None)
+
+
+def _with_stands(of: Fit, problem: Problem) -> np.ndarray:
+    """The vector of a fit for a ``problem`` that may ask what a pump held as logs began, or not: a log that
+    begins on its way asks it of all of them."""
+    last = of.problem.head
+    first = last - of.problem.stood
+    stands = of.vector[first:last] if problem.stood == of.problem.stood else np.zeros(problem.stood)
+    moved: np.ndarray = np.r_[of.vector[:first], stands, of.vector[last:]]
+    return moved
 
 
 def in_the_end(rivals: Sequence[Rival], found: Fit, best: Fit, weighing: Weighing) -> tuple[Rival, ...]:
