@@ -7,6 +7,7 @@ moves the times at which the levels change.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from scipy.optimize import minimize_scalar
@@ -17,6 +18,7 @@ from focgen.diagnosis.belief.standing import behind, holds
 from focgen.diagnosis.fitting.fit import WHITE, Fit, fit
 from focgen.diagnosis.hypotheses.accept import AcceptanceCriteria
 from focgen.diagnosis.hypotheses.converter import Converter, rms
+from focgen.diagnosis.hypotheses.own_steps import left_by_own_steps
 from focgen.diagnosis.hypotheses.rivals import Beside, Cause, Rival, alike, change_of, share_of, without
 from focgen.diagnosis.hypotheses.search import Ranking, evidence, family, is_itself, on_all, rank
 from focgen.diagnosis.numbers import NUMBERS
@@ -95,7 +97,34 @@ def _seen_through(
     tried = {n: s for n, f in plain.items() if evidence(s := converter.stepped(f), base) > asked.threshold}
     if not tried:
         return None
-    surroundings = replace(asked.surroundings, hidden=converter.left**2)
+    for hidden in _hidden(converter, base, [*tried.values()]):
+        if (cause := _told(converter, best, beside, (base, plain, tried), hidden, asked)) is not None:
+            return plain, cause
+    return None
+
+
+def _hidden(converter: Converter, base: Fit, tried: Sequence[Fit]) -> Iterator[float]:
+    """The mean square that a converter may make beside its steps: as much as real ones do, and, where a
+    family leaves far less behind steps of the converter's own, too, no more than these take of ``base``."""
+    yield converter.left**2
+    if tried:
+        own = left_by_own_steps(base)
+        if min(map(left_by_own_steps, tried)) < NUMBERS.unlikely * own:
+            yield max(0.0, min(converter.left**2, rms(base.weighed) ** 2 - own))
+
+
+def _told(
+    converter: Converter,
+    best: Fit,
+    beside: Beside,
+    fits: tuple[Fit, dict[str, Fit], dict[str, Fit]],
+    hidden: float,
+    asked: AcceptanceCriteria,
+) -> Cause | None:
+    """The cause that the likeliest of the families tried is, where it is likelier than none. ``fits``: the
+    one that they are tried beside, and theirs without the steps and with them."""
+    base, plain, tried = fits
+    surroundings = replace(asked.surroundings, hidden=hidden)
     ground = Ground.of(converter.stepped(beside.nominal), base, [*tried.values()], WHITE, surroundings)
     rare = {n: rarity([plain[n].problem.candidates[-1]]) for n in tried}
     odds = {n: ground.compared(f) + rare[n] for n, f in tried.items()}
@@ -113,7 +142,7 @@ def _seen_through(
     rivals = tuple(sorted((rival(n, f) for n, f in tried.items()), key=lambda r: r.separation))
     if holds(rivals[0].off):
         return None
-    return plain, Cause(rivals, rivals[0].gain, share_of(beside.nominal, best, tried[first]))
+    return Cause(rivals, rivals[0].gain, share_of(beside.nominal, best, tried[first]))
 
 
 def _every_family(ranking: Ranking) -> dict[str, Fit]:
