@@ -10,7 +10,7 @@ from itertools import islice, pairwise
 
 import numpy as np
 
-from focgen.diagnosis.fitting.fit import Fit, Weighing
+from focgen.diagnosis.fitting.fit import Fit
 from focgen.diagnosis.fitting.predictability import predicted
 from focgen.diagnosis.hypotheses.bootstrap import threshold as bootstrapped
 from focgen.diagnosis.hypotheses.explain import (
@@ -29,7 +29,7 @@ from focgen.diagnosis.hypotheses.initial import (
     rested_long,
 )
 from focgen.diagnosis.hypotheses.input_covariance import input_covariance
-from focgen.diagnosis.hypotheses.longer_path import on_the_path_of
+from focgen.diagnosis.hypotheses.longer_path import at_pace
 from focgen.diagnosis.hypotheses.roughly import alone, families_in, leaves_less_beside, suits_what_is_slow
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.segments import cuts, make
@@ -275,13 +275,14 @@ def _begin_elsewise(logs: Sequence[Experiment], session: Sequence[Experiment]) -
 
 
 def _left_by(explanations: Sequence[Explanation], others: Sequence[Explanation]) -> float:
-    """What explanations leave, in nats, and what their numbers cost (Schwarz's approximation), on paths no
-    longer than those of the ``others``."""
+    """What explanations leave, in nats, and what their numbers cost (Schwarz's approximation). Where those of
+    the ``others`` have a path of another length, either is fitted to the shorter one."""
     spent = 0.0
     for e, other in zip(explanations, others, strict=True):
-        left = on_the_path_of(other.best, e.best, Weighing(other.ar)).weighed
+        best, paces = e.best, [of.best.problem.segment.pace for of in (e, other)]
+        left = (at_pace(best, min(paces)) if paces[0] != paces[1] else best).weighed
         count = len(left)
-        spent += 0.5 * count * float(np.log(np.mean(left**2))) + 0.5 * e.best.size * float(np.log(count))
+        spent += 0.5 * count * float(np.log(np.mean(left**2))) + 0.5 * best.size * float(np.log(count))
     return spent
 
 

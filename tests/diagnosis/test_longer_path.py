@@ -12,7 +12,7 @@ import pytest
 
 from focgen.diagnosis.findings import _left_by
 from focgen.diagnosis.fitting.fit import WHITE, fit
-from focgen.diagnosis.hypotheses.longer_path import on_the_path_of
+from focgen.diagnosis.fitting.integrating import settled
 from focgen.diagnosis.hypotheses.nuisances import uncertain
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.segments import make
@@ -26,8 +26,8 @@ def explained(times):
     logs = session(1, back=0.98)
     problem = uncertain(RIG, make(logs, "command", "pressure", None, None), logs)
     path = replace(problem.segment, pace=times * problem.segment.pace)
-    best = fit(replace(problem, segment=path, memory={}), problem.nominal(), WHITE, 12)
-    return SimpleNamespace(best=best, ar=WHITE.ar)
+    best = settled(fit(replace(problem, segment=path, memory={}), problem.nominal(), WHITE, 12))
+    return SimpleNamespace(best=best)
 
 
 @pytest.fixture(scope="module")
@@ -47,10 +47,3 @@ def test_a_longer_path_leaves_more(usual, longer):
 def test_two_explanations_are_compared_on_paths_of_one_length(usual, longer):
     assert _left_by([longer], [usual]) == pytest.approx(_left_by([usual], [longer]), abs=1.0)
     assert _left_by([longer], [longer]) > _left_by([usual], [usual]) + NUMBERS.nats
-
-
-def test_a_path_that_is_no_longer_stays_as_it_is(usual, longer):
-    assert on_the_path_of(longer.best, usual.best, WHITE) is usual.best
-    shorter = on_the_path_of(usual.best, longer.best, WHITE)
-    assert shorter.problem.segment.pace == usual.best.problem.segment.pace
-    assert np.mean(shorter.weighed**2) < np.mean(longer.best.weighed**2)

@@ -34,7 +34,8 @@ def between_anew(rig: Rig, best: Fit, nominal: Fit, weighing: Weighing) -> tuple
 
 
 def moved_to(of: Fit, segment: Segment, weighing: Weighing, known: Known | None = None) -> Fit:
-    """A fit made anew to another account of its segment; ``known``: its Jacobian, taken as it was."""
+    """A fit made anew to another account of its segment; ``known``: its Jacobian, taken as it was, where that
+    account asks for as many numbers."""
     problem = replace(of.problem, segment=segment, memory={})
     start = _with_stands(of, problem)
     start[len(problem.nominal_start)] = 0.0  # the alignment made up for the wrong way

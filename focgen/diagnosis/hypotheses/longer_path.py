@@ -51,14 +51,11 @@ def borne_out(shown: Fit, best: Fit, usual: Problem, weighing: Weighing) -> bool
     return evidence(beside, without) + allowed > 0.0
 
 
-def on_the_path_of(other: Fit, of: Fit, weighing: Weighing) -> Fit:
-    """A fit on the path of an ``other`` one, where its own is longer: what is kept longer adds up to more, so
-    that two paths of unlike length cannot be compared."""
-    pace = other.problem.segment.pace
-    if of.problem.segment.pace <= pace:
-        return of
-    usual = replace(of.problem, segment=replace(of.problem.segment, pace=pace), memory={})
-    return fit(usual, of.vector, weighing, _ITERATIONS)
+def at_pace(of: Fit, pace: float) -> Fit:
+    """A fit made anew to a path that is kept for ``pace``, s. What is kept longer adds up to more, so that
+    squares left on paths of unlike length cannot be compared."""
+    kept = replace(of.problem, segment=replace(of.problem.segment, pace=pace), memory={})
+    return fit(kept, of.vector, WHITE, _ITERATIONS)
 
 
 def _refitted(of: Fit, problem: Problem, weighing: Weighing) -> Fit:

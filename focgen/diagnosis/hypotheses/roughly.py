@@ -12,6 +12,7 @@ import numpy as np
 
 from focgen.diagnosis.fitting.fit import Fit
 from focgen.diagnosis.hypotheses.explain import Explanation, begun_as, candidates_for, explain
+from focgen.diagnosis.hypotheses.longer_path import at_pace
 from focgen.diagnosis.hypotheses.nuisances import uncertain
 from focgen.diagnosis.hypotheses.search import likeliest_on_all
 from focgen.diagnosis.numbers import NUMBERS
@@ -45,18 +46,19 @@ def suits_what_is_slow(nominal: Rig, e: Explanation, ahead: Ahead) -> tuple[Expe
         if roughly is None or min(_left(e, roughly, ahead)) > e.square / NUMBERS.unlikely:
             continue
         found = explain(nominal, segment, ahead[0], NUMBERS.nats, [name])
-        left = _left(found, found.best, ahead)
+        left = _left(found, _kept_as(e.segment, found.best), ahead)
         if min(left) < least:
             return ahead[int(np.argmin(left))]
     return None
 
 
 def alone(nominal: Rig, segment: Segment, logs: Sequence[Experiment], name: str) -> Fit | None:
-    """A family's likeliest form by itself, its numbers fitted to means of samples; None where it has none
-    here."""
+    """A family's likeliest form by itself, its numbers fitted to means of samples, on a path that is as long
+    as the segment's; None where it has none here."""
     problem = uncertain(nominal, segment, logs)
     forms = [c for c in candidates_for(problem.segment, nominal) if c.effect == name]
-    return likeliest_on_all(problem, problem.nominal(), forms)
+    found = likeliest_on_all(problem, problem.nominal(), forms)
+    return found and _kept_as(segment, found)
 
 
 def leaves_less_beside(nominal: Rig, e: Explanation, logs: Sequence[Experiment], name: str) -> bool:
@@ -70,7 +72,13 @@ def leaves_less_beside(nominal: Rig, e: Explanation, logs: Sequence[Experiment],
     if np.mean(roughly.weighed**2) > _NEAR * asked:
         return False
     families = sorted({*e.best.problem.families, name})
-    return explain(nominal, segment, logs, NUMBERS.nats, families).square < asked
+    found = explain(nominal, segment, logs, NUMBERS.nats, families)
+    return bool(np.mean(_kept_as(e.segment, found.best).weighed ** 2) < asked)
+
+
+def _kept_as(segment: Segment, of: Fit) -> Fit:
+    """A fit on a path as long as the segment's."""
+    return of if of.problem.segment.pace == segment.pace else at_pace(of, segment.pace)
 
 
 def _left(e: Explanation, fit: Fit, ahead: Ahead) -> list[float]:

@@ -7,7 +7,7 @@ moves the times at which the levels change.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
 from scipy.optimize import minimize_scalar
@@ -97,20 +97,22 @@ def _seen_through(
     tried = {n: s for n, f in plain.items() if evidence(s := converter.stepped(f), base) > asked.threshold}
     if not tried:
         return None
-    for hidden in _hidden(converter, base, [*tried.values()]):
-        if (cause := _told(converter, best, beside, (base, plain, tried), hidden, asked)) is not None:
+    for hidden, among in _hidden(converter, base, tried):
+        if (cause := _told(converter, best, beside, (base, plain, among), hidden, asked)) is not None:
             return plain, cause
     return None
 
 
-def _hidden(converter: Converter, base: Fit, tried: Sequence[Fit]) -> Iterator[float]:
-    """The mean square that a converter may make beside its steps: as much as real ones do, and, where a
-    family leaves far less behind steps of the converter's own, too, no more than these take of ``base``."""
-    yield converter.left**2
-    if tried:
-        own = left_by_own_steps(base)
-        if min(map(left_by_own_steps, tried)) < NUMBERS.unlikely * own:
-            yield max(0.0, min(converter.left**2, rms(base.weighed) ** 2 - own))
+def _hidden(converter: Converter, base: Fit, tried: dict[str, Fit]) -> Iterator[tuple[float, dict[str, Fit]]]:
+    """The mean square that a converter may make beside its steps, and the families that are held against it:
+    as much as real ones make, and all. Then no more than steps at places of their own take of ``base``, and
+    those that leave far less than it does even so. Where errors add up no place stays."""
+    yield converter.left**2, tried
+    own, even = left_by_own_steps(base), rms(base.weighed) ** 2
+    if not base.problem.segment.pace and even - converter.left**2 < own < even:
+        far = {n: f for n, f in tried.items() if left_by_own_steps(f) < NUMBERS.unlikely * own}
+        if far:
+            yield even - own, far
 
 
 def _told(
