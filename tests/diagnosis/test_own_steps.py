@@ -15,6 +15,7 @@ from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.hypotheses.own_steps import _place, _way, left_by_own_steps
 from focgen.diagnosis.hypotheses.search import likeliest_on_all
 from focgen.diagnosis.hypotheses.seen_through import _hidden
+from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.segments import make
 from tests.diagnosis.test_converters import HEATER, answered, session, slower_down
 
@@ -71,3 +72,11 @@ def test_what_drifts_no_places_explain():
     assert (usual, all_of_them) == (converter.left**2, tried)
     assert less == pytest.approx(rms(alone.weighed) ** 2 - left_by_own_steps(alone))
     assert list(far) == ["drift"]
+
+
+def test_a_converter_makes_something_at_any_place():
+    """What moves a few samples of a sound converter is no effect."""
+    converter, alone, drift = stepped(drifting(4.0, 0.02), "gain_drift")
+    _, (least, _) = _hidden(converter, alone, {"drift": drift})
+    assert least == pytest.approx(NUMBERS.vain * converter.left**2)
+    assert rms(alone.weighed) ** 2 - left_by_own_steps(alone) < least

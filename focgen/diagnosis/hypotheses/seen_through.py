@@ -105,14 +105,15 @@ def _seen_through(
 
 def _hidden(converter: Converter, base: Fit, tried: dict[str, Fit]) -> Iterator[tuple[float, dict[str, Fit]]]:
     """The mean square that a converter may make beside its steps, and the families that are held against it:
-    as much as real ones make, and all. Then no more than steps at places of their own take of ``base``, and
-    those that leave far less than it does even so. Where errors add up no place stays."""
+    as much as real ones make, and all. Then what steps at places of their own take of ``base``, or a little
+    of the same, and those that leave far less than it even so. Where errors add up no place stays."""
     yield converter.left**2, tried
     own, even = left_by_own_steps(base), rms(base.weighed) ** 2
-    if not base.problem.segment.pace and even - converter.left**2 < own < even:
+    hidden = max(even - own, NUMBERS.vain * converter.left**2)
+    if not base.problem.segment.pace and own < even and hidden < converter.left**2:
         far = {n: f for n, f in tried.items() if left_by_own_steps(f) < NUMBERS.unlikely * own}
         if far:
-            yield even - own, far
+            yield hidden, far
 
 
 def _told(
