@@ -97,8 +97,10 @@ def _seen_through(
     tried = {n: s for n, f in plain.items() if evidence(s := converter.stepped(f), base) > asked.threshold}
     if not tried:
         return None
+    nominal = converter.stepped(beside.nominal)
     for hidden, among in _hidden(converter, base, tried):
-        if (cause := _told(converter, best, beside, (base, plain, among), hidden, asked)) is not None:
+        fits = (nominal, base, plain, among)
+        if (cause := _told(best, beside, fits, hidden, asked)) is not None:
             return plain, cause
     return None
 
@@ -117,18 +119,17 @@ def _hidden(converter: Converter, base: Fit, tried: dict[str, Fit]) -> Iterator[
 
 
 def _told(
-    converter: Converter,
     best: Fit,
     beside: Beside,
-    fits: tuple[Fit, dict[str, Fit], dict[str, Fit]],
+    fits: tuple[Fit, Fit, dict[str, Fit], dict[str, Fit]],
     hidden: float,
     asked: AcceptanceCriteria,
 ) -> Cause | None:
-    """The cause that the likeliest of the families tried is, where it is likelier than none. ``fits``: the
-    one that they are tried beside, and theirs without the steps and with them."""
-    base, plain, tried = fits
+    """The cause that the likeliest of the families tried is, where it is likelier than none. ``fits``: of
+    the rig by itself, the one that they are tried beside, and theirs without the steps and with them."""
+    nominal, base, plain, tried = fits
     surroundings = replace(asked.surroundings, hidden=hidden)
-    ground = Ground.of(converter.stepped(beside.nominal), base, [*tried.values()], WHITE, surroundings)
+    ground = Ground.of(nominal, base, [*tried.values()], WHITE, surroundings)
     rare = {n: rarity([plain[n].problem.candidates[-1]]) for n in tried}
     odds = {n: ground.compared(f) + rare[n] for n, f in tried.items()}
     first = max(odds, key=lambda n: odds[n])
