@@ -25,7 +25,6 @@ from focgen.diagnosis.numbers import NUMBERS
 from focgen.rig.effects import library
 
 _STEPS = 6  # iterations
-_AS_WELL = 1.02  # times the error: a loop has more numbers
 _FINELY = {"xatol": 0.003, "maxiter": 20}  # of a step
 
 
@@ -43,7 +42,8 @@ def _its_own(
     converter: Converter, best: Fit, causes: tuple[Cause, ...], beside: Beside
 ) -> tuple[Fit, tuple[Cause, ...]]:
     """What was found, but for a loop of the reading that is the converter's own: where its levels go on late
-    either way, as those of encoders and comparators do, the loop is no wider than a step."""
+    either way, as those of encoders and comparators do, the loop is no wider than a step. Where levels change
+    is fitted roughly, so the loop has to leave far less than that."""
     loops = [c.rivals[0].effect for c in causes if _is_loop_behind(c.rivals[0])]
     if not loops:
         return best, causes
@@ -53,7 +53,7 @@ def _its_own(
     missed = lambda lag: rms(converter.sluggish(lag).stepped(bare).weighed)
     closest = minimize_scalar(missed, bounds=(0.0, 0.5), method="bounded", options=_FINELY)
     there = best if converter.candidate in best.problem.candidates else converter.stepped(best)
-    if closest.fun > _AS_WELL * rms(there.weighed):
+    if rms(there.weighed) ** 2 < NUMBERS.unlikely * closest.fun**2:
         return best, causes
     kept = tuple(c for c in causes if c.rivals[0].effect not in own)
     stands, every = converter.sluggish(float(closest.x)).beside(bare, beside.nominal, kept, weighing)
