@@ -110,9 +110,11 @@ def _hidden(converter: Converter, base: Fit, tried: dict[str, Fit]) -> Iterator[
     as much as real ones make, and all. Then what steps at places of their own take of ``base``, or a little
     of the same, and those that leave far less than it even so. Where errors add up no place stays."""
     yield converter.left**2, tried
+    if base.problem.segment.pace:
+        return
     own, even = left_by_own_steps(base), rms(base.weighed) ** 2
     hidden = max(even - own, NUMBERS.vain * converter.left**2)
-    if not base.problem.segment.pace and own < even and hidden < converter.left**2:
+    if own < even and hidden < converter.left**2:
         far = {n: f for n, f in tried.items() if left_by_own_steps(f) < NUMBERS.unlikely * own}
         if far:
             yield hidden, far
