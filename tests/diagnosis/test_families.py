@@ -6,6 +6,7 @@ that came back from a bad fit, or when a name stands for what it does not mean.
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -23,6 +24,7 @@ from focgen.diagnosis.problem.problem import CandidateEffect
 from focgen.diagnosis.problem.segments import make
 from focgen.diagnosis.verdict import summary
 from focgen.diagnosis.verdict.cautions import the_rest
+from focgen.diagnosis.verdict.improvement import Improvement
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import form_of, library
@@ -182,3 +184,18 @@ def test_effects_that_leave_more_than_they_close_stand_for_something_else(
     assert made.more_is_left == more
     assert made.stands_for_more == (more and not rounded)
     assert ["2.8 times the noise" in note for note in the_rest(made)] == [True] * (more and not rounded)
+
+
+@pytest.mark.parametrize("goes_on", [False, True])
+@pytest.mark.parametrize("foretold, follows", [(0.8, False), (0.5, True), (-0.5, True)])
+def test_effects_that_foretell_little_of_what_they_close_follow_the_logs(
+    foretold, follows, goes_on, monkeypatch
+):
+    """Nothing foretells how a drift goes on."""
+    monkeypatch.setattr(summary, "drifting", lambda e: goes_on)
+    squares = {"refitted": np.array([1.1]), "explained": np.array([0.1])}
+    total = Improvement(0.7, (0.0, 1.0), 1.0 - foretold)
+    made = summary.Summary(None, [(SimpleNamespace(causes=()), None)], {}, squares, 0.1, total)
+    assert made.follows_these_logs == (follows and not goes_on)
+    closed = {0.5: "closes 100% .* 50% in", -0.5: "closes 100% .* nothing in"}.get(foretold, "closes")
+    assert [bool(re.search(closed, note)) for note in the_rest(made)] == [True] * made.follows_these_logs

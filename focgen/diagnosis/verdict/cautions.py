@@ -68,6 +68,12 @@ def the_rest(summary: Summary) -> Iterator[str]:
             "what was found closes less than half of the gap, and the error stays "
             f"{summary.loudness:.1f} times the noise: something else is missing, which it may stand for"
         )
+    if summary.follows_these_logs:
+        yield (
+            f"what was found closes {summary.closed:.0%} of the gap in these logs, and fitted to parts of "
+            f"them {_little(summary.foretold)} in the others: it may follow what is missing instead of being it; "
+            "replay augmented.toml on a new log before you believe it"
+        )
     for e in {id(e): e for e, _ in summary.causes}.values():
         if is_driven(e):
             yield (
@@ -79,6 +85,10 @@ def the_rest(summary: Summary) -> Iterator[str]:
                 f"{_within(e)}: what is left is {np.sqrt(louder(e)):.1f} times as large where the rig moves "
                 "as where it rests, which noise is not: something else acts there, which it may stand for"
             )
+
+
+def _little(share: float) -> str:
+    return f"{share:.0%}" if share > 0.0 else "nothing"
 
 
 def ended(causes: Sequence[tuple[Explanation, Cause]]) -> Iterator[str]:

@@ -20,10 +20,12 @@ _MOST = 1.02  # measured on few experiments, noise may make it more than all
 
 @dataclass(frozen=True)
 class Improvement:
-    """The predicted share of the explainable mean square, and its 90 % interval."""
+    """The predicted share of the explainable mean square, and its 90 % interval; ``lost``: what fits lose of
+    that share on parts of the session that they did not see."""
 
     value: float
     interval: tuple[float, float]
+    lost: float = 0.0
 
 
 def predict(
@@ -49,7 +51,7 @@ def predict(
     wide = _FORM + _LOUD * noise + _REST * (1.0 - value) + _DOUBTED * min(lost, _LOST_IN_DOUBT)
     low, high = min(low, value - wide - _AHEAD * drifts), max(high, value + 0.5 * wide)
     low, value, high = (float(np.clip(v, -1.0, _MOST)) for v in (low, value, high))
-    return Improvement(value, (low, high))
+    return Improvement(value, (low, high), lost)
 
 
 def _share(refitted: np.ndarray, explained: np.ndarray, floor: float) -> float:

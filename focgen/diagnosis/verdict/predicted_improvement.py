@@ -24,6 +24,12 @@ def paths(e: Explanation) -> list[CandidateEffect]:
     return [c for c in e.best.problem.candidates if c.form.wanders]
 
 
+def drifting(e: Explanation) -> bool:
+    """Whether any of a segment's effects goes on through the session, in any of its forms."""
+    forms = [f for name in e.best.problem.families for f in library()[name].forms]
+    return any(p.clock == "session" for f in forms for p in f.parameters)
+
+
 def promised(
     rig: Rig,
     logs: Sequence[Experiment],
@@ -39,9 +45,8 @@ def promised(
         rigs = compose.compose(rig, lasting, logs)
         made = compose.simulated(rigs.fitted, rigs.placed, logs)
         explained = np.maximum(compose.squares(logs, made), explained)
-    names = {name for e in explanations for name in e.best.problem.families}
-    drifts = any(p.clock == "session" for name in names for f in library()[name].forms for p in f.parameters)
-    found = predict(squares["refitted"], explained, cross_validated(rig, logs, lasting), floor, drifts)
+    foreseen, drifts = cross_validated(rig, logs, lasting), any(map(drifting, explanations))
+    found = predict(squares["refitted"], explained, foreseen, floor, drifts)
     if found is not None and not any(e.best.problem.candidates for e in lasting):
         return replace(found, value=0.0)  # what returns to its mean neither mends nor harms
     return found

@@ -20,7 +20,7 @@ from focgen.diagnosis.verdict.improvement import Improvement
 from focgen.diagnosis.verdict.instead import Instead, sound_part
 from focgen.diagnosis.verdict.late import logged_late
 from focgen.diagnosis.verdict.moments import changed_at_once
-from focgen.diagnosis.verdict.predicted_improvement import paths, promised
+from focgen.diagnosis.verdict.predicted_improvement import drifting, paths, promised
 from focgen.diagnosis.verdict.taken_up import taken_up
 from focgen.diagnosis.verdict.two_instead import two_instead
 from focgen.diagnosis.verdict.uneven import unevenly_paced
@@ -69,6 +69,25 @@ class Summary:
     def stands_for_more(self) -> bool:
         """The same, but for steps of a rounding, which never fall where a model has them."""
         return self.more_is_left and not any(is_rounded(e.causes) for e, _ in self.causes)
+
+    @property
+    def closed(self) -> float:
+        """The share of what can be explained that the effects close in these logs."""
+        refitted, explained = (float(np.mean(self.squares[name])) for name in ("refitted", "explained"))
+        return (refitted - explained) / max(refitted - self.floor, 1e-300)
+
+    @property
+    def foretold(self) -> float:
+        """The same of parts of the session, each by fits to the others."""
+        return self.closed - self.total.lost if self.total else self.closed
+
+    @property
+    def follows_these_logs(self) -> bool:
+        """Whether much of what the effects close is lost on parts of the session that their numbers were not
+        fitted to: then these may follow what is missing instead of being it. Not so of what goes on as no log
+        can show, nor of steps of a rounding."""
+        less = self.foretold < NUMBERS.unlikely * self.closed
+        return less and not any(is_rounded(e.causes) or drifting(e) for e, _ in self.causes)
 
 
 @dataclass(frozen=True, eq=False)
