@@ -29,7 +29,7 @@ CONSTANTS = {
     "hypotheses/nuisances.py": ["_GAUGE", "_OUT_OF_STEP", "_SMOOTHER"],
     "hypotheses/roughly.py": ["_NEAR"],
     "hypotheses/search.py": ["_ADRIFT", "_BENT", "_FAR", "_NEAR", "_QUICK"],
-    "hypotheses/seen_through.py": ["_AS_WELL", "_FINELY"],
+    "hypotheses/seen_through.py": ["_FINELY"],
     "hypotheses/uneven_pace.py": ["_CURVE", "_RATE"],
     "problem/decimate.py": ["_WITHIN"],
     "problem/excitation.py": ["_STEADY"],
