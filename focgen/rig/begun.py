@@ -104,7 +104,9 @@ def _tell(run: Run) -> _Told:
     kept = [s + len(past) + np.arange(n) for s, past, n in zip(starts, pasts, lengths)]
     by_itself = tuple(gap is None for gap in gaps)
     stands = tuple(place for place, own in zip(run.stands, by_itself) if own)
-    long = replace(run, rest=rest, clock=np.concatenate(clock), begins=(), stands=stands)
+    own = zip(run.begins, by_itself, starts, pasts)
+    guessed = tuple((int(s), int(s) + len(past)) for b, alone, s, past in own if alone and not b.known)
+    long = replace(run, rest=rest, clock=np.concatenate(clock), begins=(), stands=stands, guessed=guessed)
     duration = max(run.duration, h * max(b - a for a, b in long.spans))
     return _Told(tuple(zip(pasts, sooner)), by_itself, replace(long, duration=duration), np.concatenate(kept))
 

@@ -16,8 +16,11 @@ from focgen.diagnosis.problem.segments import make
 from focgen.diagnosis.verdict.outside import from_outside
 from focgen.diagnosis.verdict.unexplained import is_unknown
 from focgen.fractional.transfer import TransferFunction
+from focgen.logs.begin import Begin
 from focgen.logs.experiment import Experiment
 from focgen.rig import kernels
+from focgen.rig.begun import past_of, with_past
+from focgen.rig.effects import Run, form_of
 from focgen.rig.rig import Delays, LinearActuator, Rig, Signals
 
 GAIN, LAG = 1.2, 3.0
@@ -85,9 +88,27 @@ def test_a_held_valve_moves_as_its_rule_says(left, anew):
     assert len(np.unique(made)) > 10
 
 
-@pytest.mark.parametrize("band, left", [(4.5, 1.5), pytest.param(2.5, 2.5, marks=pytest.mark.long)])
-def test_a_valve_that_sticks_in_a_loop_is_no_hysteresis(band, left):
-    found = explained(loop(3, band, left, count=600))
+@pytest.mark.parametrize("form", ["stick_slip_begun", "slips_begun"])
+def test_a_valve_whose_place_is_given_lies_there_whatever_past_was_guessed(form):
+    """A past that no log shows is one that leaves the plant where it was: of the valve's positions."""
+    u = 40.0 + np.cumsum(np.random.default_rng(1).normal(0.0, 0.4, 300))
+    begin = Begin((55.0, 30.0, u[0]), (9.0, 4.0))
+    run = Run.of([300], [0.0], 1.0, [begin])
+    whole, kept = past_of(run)
+    x = with_past(u, run)
+    made = form_of("valve_stiction", form).act(x, (1.5, 0.3, 0.7), whole)
+    np.testing.assert_array_equal(made[kept], valve(u, 1.5, 0.3 * 1.5, form == "slips_begun", 0.7 * 1.5))
+    ahead = np.delete(np.arange(len(x)), kept)
+    assert len(ahead) > 8
+    np.testing.assert_array_equal(made[ahead], x[ahead])
+
+
+@pytest.mark.parametrize(
+    "band, left, count",
+    [(4.5, 1.5, 600), (4.5, 1.5, 1200), pytest.param(2.5, 2.5, 600, marks=pytest.mark.long)],
+)
+def test_a_valve_that_sticks_in_a_loop_is_no_hysteresis(band, left, count):
+    found = explained(loop(3, band, left, count=count))
     first = found.causes[0].rivals[0]
     assert first.effect == "valve_stiction" and not is_unknown(found)
     assert found.best.problem.values(found.best.vector)[0][0] == pytest.approx(band, rel=0.1)
@@ -156,8 +177,8 @@ def swept(band, seed=1):
     ],
 )
 def test_a_band_is_found_wherever_it_lies_between_two_starts(band):
-    """Many slips in a row fit no band but theirs."""
+    """Many slips in a row fit no band but theirs, and those that the command passes in the same step."""
     (e,) = explain_all(RIG, [swept(band)], 12.0, ["valve_stiction"])
     (first, *_) = e.best.problem.values(e.best.vector)
-    assert first[0] == pytest.approx(band, rel=0.02)
+    assert first[0] == pytest.approx(band, rel=0.02, abs=100.0 / 399.0)
     assert np.std(e.best.weighed) < 1.2 * 0.5 / e.segment.level_out

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from focgen.diagnosis.fitting.fit import WHITE, Fit, fit, innovations, jacobian
+from focgen.diagnosis.fitting.pinned import pinned
 from focgen.diagnosis.problem.problem import Problem
 
 _BEST = 6  # of the starts are looked about
@@ -24,8 +25,8 @@ _WORTH = 0.97  # of the sum of squares: where no start leaves less, none is look
 _STEP = 0.1  # of a number, or of its range where that is 0: the first step from the best
 _ROUNDS = 10  # of steps, each in every number
 _FINEST = 0.02  # of the first step: closer is left to the fit
-_TURNS = 2  # of trying and fitting: what is beside the form was fitted without it
 _FITTED = 6  # iterations of a fit
+_LIKELIEST, _SETTLED = 3, 4  # starts beside which what else is fitted gives way, and iterations
 
 
 def by_trying(
@@ -35,24 +36,51 @@ def by_trying(
     it), begun at the best of ``starts``. ``known``: the Jacobian's rows at ``base``. A valve that makes a
     loop cycle draws a fit without it far away, so it is tried beside the nominal parameters as given, too.
     """
-    found = [_tried(problem, base, starts, known)]
+    found = _tried(problem, base, starts, known)
     given = np.r_[problem.nominal_start, base[len(problem.nominal_start) :]]
-    if len(problem.nominal_start) and found[0].sse < _WORTH * _Missed(problem, base, known).before:
-        found.append(_tried(problem, given, starts, None))
+    least = min(of.sse for of in found)
+    if len(problem.nominal_start) and least < _WORTH * _Missed(problem, base, known).before:
+        found += _tried(problem, given, starts, None)
     return min(found, key=lambda f: f.cost)
 
 
-def _tried(problem: Problem, base: np.ndarray, starts: Sequence[np.ndarray], known: np.ndarray | None) -> Fit:
-    found: list[Fit] = []
-    for _ in range(_TURNS):
-        missed = _Missed(problem, base, known)
-        values, starts = _closest(missed, starts)
-        found.append(fit(problem, np.r_[base, values], WHITE, _FITTED, tolerance=0.1))
-        best = min(found, key=lambda f: f.cost)
-        if best.sse > _WORTH * missed.before:
-            break
-        base, known, starts = best.vector[: len(base)], None, [best.vector[len(base) :], *starts]
-    return best
+def _tried(
+    problem: Problem, base: np.ndarray, starts: Sequence[np.ndarray], known: np.ndarray | None
+) -> list[Fit]:
+    """Fits begun about the best of the ``starts``. What is beside the form was fitted without it: it is tried
+    once more beside what that has become, and with what it becomes beside the likeliest of the starts."""
+    missed = _Missed(problem, base, known)
+    values, kept = _closest(missed, starts)
+    found = [_fitted(problem, base, values)]
+    if found[0].sse < _WORTH * missed.before:
+        first, values = np.split(found[0].vector, [len(base)])
+        found.append(_about_there(problem, first, [values, *kept]))
+    if missed(values) < _WORTH * missed.before:
+        found.append(_given_way(problem, base, kept))
+    return found
+
+
+def _fitted(problem: Problem, base: np.ndarray, values: np.ndarray) -> Fit:
+    return fit(problem, np.r_[base, values], WHITE, _FITTED, tolerance=0.1)
+
+
+def _about_there(problem: Problem, base: np.ndarray, starts: Sequence[np.ndarray]) -> Fit:
+    values, _ = _closest(_Missed(problem, base, None), starts)
+    return _fitted(problem, base, values)
+
+
+def _given_way(problem: Problem, base: np.ndarray, starts: Sequence[np.ndarray]) -> Fit:
+    """The best fit from the likeliest of the ``starts``, once what is beside the form is fitted to each: it
+    may be further from where it was than a slope tells."""
+    *others, last = problem.candidates
+
+    def beside(values: np.ndarray) -> Fit:
+        held = problem.with_candidates([*others, pinned(last, values)])
+        return fit(held, np.r_[base, values], WHITE, _SETTLED, tolerance=0.1)
+
+    best = min((beside(values) for values in starts[:_LIKELIEST]), key=lambda f: f.cost)
+    moved, values = np.split(best.vector, [len(base)])
+    return _about_there(problem, moved, [values])
 
 
 class _Missed:

@@ -13,7 +13,8 @@ from functools import partial
 
 import numpy as np
 
-from focgen.diagnosis.fitting.fit import FIXED, WHITE, Fit, Weighing, fit, problem_residual
+from focgen.diagnosis.fitting.fit import WHITE, Fit, Weighing, fit, problem_residual
+from focgen.diagnosis.fitting.pinned import pinned
 from focgen.diagnosis.hypotheses.rivals import Cause, Rival, share_of
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
@@ -24,7 +25,6 @@ from focgen.rig.placed import slot_in
 
 _SHARP = 20_000  # parts of the range: what readings may lie off a level that is one
 _READINGS = 2  # of one level at most, in the mean: then there is little between the levels
-_PINNED = 0.25 * FIXED  # of a reference: what is held may move either way
 _REFITTED = 6  # iterations
 _EASED = (0.2, 0.06)  # of a step: what it rises in, as it is fitted
 
@@ -52,7 +52,7 @@ class Converter:
         """The same with levels that go on ``lag`` of a step late, on either way."""
         form = form_of(self.candidate.effect, "sluggish")
         entries = (*self.entries, lag)
-        return Converter(_held(replace(self.candidate, form=form), entries), entries, self.step)
+        return Converter(pinned(replace(self.candidate, form=form), entries), entries, self.step)
 
     def explains(self, of: Fit) -> bool:
         """Whether the residual is no larger than what a converter's steps leave."""
@@ -132,19 +132,11 @@ def converter_of(problem: Problem, candidates: Sequence[CandidateEffect]) -> Con
             slot = slot_in(candidate.form, candidate.stage)
             scales = [problem.references.scale(p, slot) for p in candidate.form.parameters]
             entries = tuple(v / s for v, s in zip(values, scales))
-            held = _held(candidate, entries)
+            held = pinned(candidate, entries)
             found = Converter(held, entries, values[0] / problem.segment.level_out)
             read = _is_sharp(problem, candidate, values) or _is_read(problem, found, values)
             return found if read else None
     return None
-
-
-def _held(candidate: CandidateEffect, entries: Sequence[float]) -> CandidateEffect:
-    """The rounding with its parameters where they were seen: no fit moves them, for steps have no slope."""
-    ends = ((e - _PINNED, e + _PINNED) for e in entries)
-    own = zip(candidate.form.parameters, ends)
-    parameters = tuple(replace(p, lower=low, upper=high) for p, (low, high) in own)
-    return replace(candidate, form=replace(candidate.form, parameters=parameters))
 
 
 def _is_sharp(problem: Problem, candidate: CandidateEffect, values: Values) -> bool:

@@ -51,13 +51,25 @@ def _stick(x: Array, values: Values, run: Run) -> Array:
 
 
 def _slip(x: Array, values: Values, run: Run) -> Array:
-    band, left, *place = values
-    return kernels.stick(x, run.rest, band, left * band, False, *(p * band for p in place))
+    return _slipping(x, values, run, anew=False)
 
 
 def _slips(x: Array, values: Values, run: Run) -> Array:
+    return _slipping(x, values, run, anew=True)
+
+
+def _slipping(x: Array, values: Values, run: Run, anew: bool) -> Array:
+    """A valve whose place is given lies there as a log begins. What went before, if no log shows it, is what
+    the plant was fed: the valve's positions, not its commands."""
     band, left, *place = values
-    return kernels.stick(x, run.rest, band, left * band, True, *(p * band for p in place))
+    if not place or not run.guessed:
+        return kernels.stick(x, run.rest, band, left * band, anew, *(p * band for p in place))
+    rest = run.rest.copy()
+    rest[[end for _, end in run.guessed]] = kernels.BALANCED
+    made = kernels.stick(x, rest, band, left * band, anew, place[0] * band)
+    for first, end in run.guessed:
+        made[first:end] = x[first:end]
+    return made
 
 
 _BAND = Parameter("band", level=1, lower=0.0, upper=0.5, starts=_BANDS, zero=0.0)
