@@ -8,6 +8,7 @@ pause between them: what that one leaves is there already.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
@@ -104,11 +105,20 @@ def _tell(run: Run) -> _Told:
     kept = [s + len(past) + np.arange(n) for s, past, n in zip(starts, pasts, lengths)]
     by_itself = tuple(gap is None for gap in gaps)
     stands = tuple(place for place, own in zip(run.stands, by_itself) if own)
-    own = zip(run.begins, by_itself, starts, pasts)
-    guessed = tuple((int(s), int(s) + len(past)) for b, alone, s, past in own if alone and not b.known)
-    long = replace(run, rest=rest, clock=np.concatenate(clock), begins=(), stands=stands, guessed=guessed)
+    long = replace(run, rest=rest, clock=np.concatenate(clock), begins=(), stands=stands)
+    long = replace(long, guessed=_guessed(run, starts, pasts))
     duration = max(run.duration, h * max(b - a for a, b in long.spans))
     return _Told(tuple(zip(pasts, sooner)), by_itself, replace(long, duration=duration), np.concatenate(kept))
+
+
+def _guessed(run: Run, starts: Array, pasts: Sequence[Array]) -> tuple[tuple[int, int], ...]:
+    """The pasts of which no log shows anything, put ahead at ``starts``; with what a run begins with that is
+    one as well."""
+    ahead, found = dict(run.guessed), []
+    for begin, (a, _), start, past in zip(run.begins, run.spans, starts, pasts):
+        if begin != REST and not begin.known and begin.after is None:
+            found.append((int(start), int(start) + len(past) + ahead.get(a, a) - a))
+    return tuple(found)
 
 
 def _gaps(run: Run) -> list[float | None]:

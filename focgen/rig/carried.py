@@ -28,7 +28,10 @@ def carried(chain: Chain, log: Experiment, entry: str, begin: Begin, last: str) 
     ``log`` has both signals. What was longer ago is given by means over longer windows.
     """
     past = begin.samples(log.sample_time)
-    run = Run.of([len(past) + FIRST], [log.start], log.sample_time, [Begin(begin.levels[:1])])
+    ahead = replace(begin, levels=begin.levels[:1], ago=())
+    run = Run.of([len(past) + FIRST], [log.start], log.sample_time, [ahead])
+    if not begin.known and begin.after is None:
+        run = replace(run, guessed=((0, len(past)),))
     x = np.concatenate([past, np.asarray(log[entry], float)[:FIRST]])
     made = chain.run(x, ENTERS[entry], last, run, between_of(chain.rig, entry))
     off = float(np.mean(np.asarray(log[LEAVES[last]], float)[:FIRST] - made[-FIRST:]))

@@ -193,9 +193,21 @@ def test_effects_that_foretell_little_of_what_they_close_follow_the_logs(
 ):
     """Nothing foretells how a drift goes on."""
     monkeypatch.setattr(summary, "drifting", lambda e: goes_on)
-    squares = {"refitted": np.array([1.1]), "explained": np.array([0.1])}
-    total = Improvement(0.7, (0.0, 1.0), 1.0 - foretold)
-    made = summary.Summary(None, [(SimpleNamespace(causes=()), None)], {}, squares, 0.1, total)
+    made = closing(1.1, 0.1, lost=1.0 - foretold)
     assert made.follows_these_logs == (follows and not goes_on)
     closed = {0.5: "closes 100% .* 50% in", -0.5: "closes 100% .* nothing in"}.get(foretold, "closes")
     assert [bool(re.search(closed, note)) for note in the_rest(made)] == [True] * made.follows_these_logs
+
+
+@pytest.mark.parametrize("refitted, explained", [(0.14, 0.1), (1.0, 1.1), (0.05, 0.1), (0.1, 0.1)])
+def test_what_is_lost_of_little_is_the_noises(refitted, explained, monkeypatch):
+    """In a gap as small as noise, or of what closes nothing."""
+    monkeypatch.setattr(summary, "drifting", lambda e: False)
+    assert not closing(refitted, explained, lost=0.9).follows_these_logs
+
+
+def closing(refitted, explained, lost):
+    """One cause that closes so much of a gap above a noise of 0.1."""
+    squares = {"refitted": np.array([refitted]), "explained": np.array([explained])}
+    total = Improvement(0.7, (0.0, 1.0), lost)
+    return summary.Summary(None, [(SimpleNamespace(causes=()), None)], {}, squares, 0.1, total)

@@ -103,6 +103,17 @@ def test_a_valve_whose_place_is_given_lies_there_whatever_past_was_guessed(form)
     np.testing.assert_array_equal(made[ahead], x[ahead])
 
 
+@pytest.mark.parametrize("known", [False, True])
+def test_a_log_from_rest_begins_as_it_does_by_itself_beside_one_in_use(known):
+    u = np.cumsum(np.random.default_rng(1).normal(0.0, 0.4, 300))
+    act, values = form_of("valve_stiction", "slips_begun").act, (1.5, 0.3, 0.7)
+    run = Run.of([300, 300], [0.0, 900.0], 1.0, [Begin(), Begin((55.0, 30.0), (9.0,), known)])
+    whole, kept = past_of(run)
+    made = act(with_past(np.concatenate([u, u + 30.0]), run), values, whole)[kept]
+    np.testing.assert_array_equal(made[:300], act(u, values, Run.of([300], [0.0], 1.0)))
+    assert abs(made[300] - (30.0 + u[0] - 0.7 * 1.5)) < 1e-9 or known
+
+
 @pytest.mark.parametrize(
     "band, left, count",
     [(4.5, 1.5, 600), (4.5, 1.5, 1200), pytest.param(2.5, 2.5, 600, marks=pytest.mark.long)],

@@ -50,12 +50,12 @@ def _tried(
     """Fits begun about the best of the ``starts``. What is beside the form was fitted without it: it is tried
     once more beside what that has become, and with what it becomes beside the likeliest of the starts."""
     missed = _Missed(problem, base, known)
-    values, kept = _closest(missed, starts)
-    found = [_fitted(problem, base, values)]
+    closest, kept = _closest(missed, starts)
+    found = [_fitted(problem, base, closest)]
     if found[0].sse < _WORTH * missed.before:
-        first, values = np.split(found[0].vector, [len(base)])
-        found.append(_about_there(problem, first, [values, *kept]))
-    if missed(values) < _WORTH * missed.before:
+        moved, values = np.split(found[0].vector, [len(base)])
+        found.append(_about_there(problem, moved, [values, *kept]))
+    if missed(closest) < _WORTH * missed.before:
         found.append(_given_way(problem, base, kept))
     return found
 

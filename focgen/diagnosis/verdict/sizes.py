@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from focgen.control.units import units_of_rig
-from focgen.diagnosis.fitting.fit import Fit
+from focgen.diagnosis.fitting.fit import FIXED, Fit
 from focgen.diagnosis.hypotheses.rivals import Rival
 from focgen.diagnosis.model import Estimate
 from focgen.rig.effects import Parameter
@@ -43,7 +43,7 @@ def estimates(of: Fit, which: int, rig: Rig) -> dict[str, Estimate]:
 
 def at_their_ends(rival: Rival) -> tuple[str, ...]:
     """The shares and factors of an effect that are as large, or as small, as is looked for. 0 and 1, none of
-    something and all of it, are no such ends."""
+    something and all of it, are no such ends, nor are those between which no fit moves a number."""
     of, found = rival.fit, []
     place = of.problem.head
     for candidate in of.problem.candidates:
@@ -51,6 +51,7 @@ def at_their_ends(rival: Rival) -> tuple[str, ...]:
             value = np.exp(of.vector[place]) if p.log else of.vector[place]
             ends = [e for e in (p.lower, p.upper) if np.isfinite(e) and abs(e) not in (0.0, 1.0)]
             plain = candidate.effect == rival.effect and not p.level and not p.time
+            plain = plain and p.upper - p.lower > FIXED
             if plain and any(abs(value - end) <= _SLACK * abs(end) for end in ends):
                 found.append(p.name)
             place += 1

@@ -85,8 +85,8 @@ class Run:
     ``lasts``: what remembers lies, as an experiment begins at rest, where its last turn left it.
     ``stands``: where a stage that integrates stood as each began; none where it was at 0 in all.
     ``rough``: what is integrated in steps may take them twice as long, for fits that are but compared.
-    ``guessed``: spans (first sample, one after the last) of pasts that no log shows: an input that leaves the
-    plant where an experiment finds it, whatever came to pass.
+    ``guessed``: spans (first sample, one after the last) of pasts of which no log shows anything: an input
+    that leaves the plant where an experiment finds it, whatever came to pass.
     """
 
     h: float
