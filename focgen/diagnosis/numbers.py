@@ -221,7 +221,8 @@ class Numbers:
     )
     unlikely: float = _number(
         0.7,
-        "left at most by an actuator far from the one given; how sure a cause beside it may be",
+        "left at most by an actuator far from the one given; how sure a cause beside it may be, or one that "
+        "parts of the session foretell less of than this in others",
         "of the mean square, of the confidence",
         "tuning cases",
         _SAME,

@@ -26,6 +26,7 @@ _STEP = 0.1  # of a number, or of its range where that is 0: the first step from
 _ROUNDS = 10  # of steps, each in every number
 _FINEST = 0.02  # of the first step: closer is left to the fit
 _FITTED = 6  # iterations of a fit
+_TURNS = 4  # of looking about the best and fitting what is beside
 _LIKELIEST, _SETTLED = 3, 4  # starts beside which what else is fitted gives way, and iterations
 
 
@@ -41,7 +42,19 @@ def by_trying(
     least = min(of.sse for of in found)
     if len(problem.nominal_start) and least < _WORTH * _Missed(problem, base, known).before:
         found += _tried(problem, given, starts, None)
-    return min(found, key=lambda f: f.cost)
+    return _looked_about(min(found, key=lambda f: f.cost), len(base))
+
+
+def _looked_about(best: Fit, head: int) -> Fit:
+    """The best fit about one whose form's values are those from ``head`` on. What gives way beside them may
+    let them come closer."""
+    for _ in range(_TURNS):
+        base, values = np.split(best.vector, [head])
+        again = _about_there(best.problem, base, [values])
+        if again.cost >= best.cost:
+            break
+        best = again
+    return best
 
 
 def _tried(

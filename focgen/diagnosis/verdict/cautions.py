@@ -70,9 +70,9 @@ def the_rest(summary: Summary) -> Iterator[str]:
         )
     if summary.follows_these_logs:
         yield (
-            f"what was found closes {summary.closed:.0%} of the gap in these logs, and fitted to parts of "
+            f"what was found closes {summary.closed:.0%} of the gap in these logs, but fitted to parts of "
             f"them {_little(summary.foretold)} in the others: it may follow what is missing instead of being "
-            "it; replay augmented.toml on a new log before you believe it"
+            "it. Replay augmented.toml on a new log"
         )
     for e in {id(e): e for e, _ in summary.causes}.values():
         if is_driven(e):
