@@ -5,11 +5,13 @@ its confidence to noise.
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from focgen.diagnosis.diagnose import diagnose
+from focgen.diagnosis.verdict import unexplained
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.rig import LinearActuator, Rig, Signals
@@ -56,6 +58,21 @@ def test_a_cut_out_is_nothing_for_sure(seed):
     sure = [c.confidence for cause in found.causes for c in cause.candidates]
     assert found.verdict == "unknown" or max(sure) <= 0.67
     assert found.verdict == "unknown" or any("no input predicts it" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("jumps", [False, True])
+def test_slips_at_another_time_are_nothing_else(jumps, monkeypatch):
+    """What a valve that sticks leaves, where it slips a little late, is whole slips."""
+    monkeypatch.setattr(unexplained, "disturbed", lambda e: SimpleNamespace(pushed=True))
+    monkeypatch.setattr(unexplained, "is_rounded", lambda causes: False)
+    form = SimpleNamespace(jumps=jumps)
+    found = SimpleNamespace(
+        causes=(None,),
+        segment=SimpleNamespace(closed=False, pace=0.0),
+        best=SimpleNamespace(problem=SimpleNamespace(candidates=[SimpleNamespace(form=form)])),
+        predictability=SimpleNamespace(share=0.0),
+    )
+    assert unexplained.is_driven(found) != jumps
 
 
 @pytest.mark.parametrize(

@@ -70,8 +70,11 @@ def acts_besides(e: Explanation) -> bool:
 
 def is_driven(e: Explanation) -> bool:
     """Whether what effects leave of a segment has passed through the rig, far above its noise, and inputs
-    predict little of it. What goes round in a loop, or adds up, is left so by noise."""
+    predict little of it. What goes round in a loop, or adds up, is left so by noise, and what jumps by whole
+    jumps at another time."""
     if not e.causes or e.segment.closed or e.segment.pace or is_rounded(e.causes):
+        return False
+    if any(candidate.form.jumps for candidate in e.best.problem.candidates):
         return False
     return e.predictability.share < NUMBERS.left and disturbed(e).pushed
 
