@@ -206,8 +206,15 @@ def test_what_is_lost_of_little_is_the_noises(refitted, explained, monkeypatch):
     assert not closing(refitted, explained, lost=0.9).follows_these_logs
 
 
-def closing(refitted, explained, lost):
+@pytest.mark.parametrize("pace", [0.0, 30.0])
+def test_where_errors_add_up_parts_foretell_nothing(pace, monkeypatch):
+    monkeypatch.setattr(summary, "drifting", lambda e: False)
+    assert closing(1.1, 0.1, lost=0.9, pace=pace).follows_these_logs == (pace == 0.0)
+
+
+def closing(refitted, explained, lost, pace=0.0):
     """One cause that closes so much of a gap above a noise of 0.1."""
     squares = {"refitted": np.array([refitted]), "explained": np.array([explained])}
     total = Improvement(0.7, (0.0, 1.0), lost)
-    return summary.Summary(None, [(SimpleNamespace(causes=()), None)], {}, squares, 0.1, total)
+    found = SimpleNamespace(causes=(), segment=SimpleNamespace(pace=pace))
+    return summary.Summary(None, [(found, None)], {}, squares, 0.1, total)

@@ -85,12 +85,13 @@ class Summary:
     def follows_these_logs(self) -> bool:
         """Whether much of what the effects close is lost on parts of the session that their numbers were not
         fitted to: then these may follow what is missing instead of being it. Not so of what goes on as no log
-        can show, of steps of a rounding, nor in a gap that tells no more than noise: fits lose some of it."""
+        can show, of steps of a rounding, nor in a gap that tells no more than noise: fits lose some of it.
+        Where errors add up, what one part loses goes on through the others."""
         loud = self.floor < NUMBERS.above**2 * float(np.mean(self.squares["refitted"]))
         less = 0.0 < self.closed and self.foretold < NUMBERS.unlikely * self.closed
         if not (self.causes and loud and less):
             return False
-        return not any(is_rounded(e.causes) or drifting(e) for e, _ in self.causes)
+        return not any(e.segment.pace or is_rounded(e.causes) or drifting(e) for e, _ in self.causes)
 
 
 @dataclass(frozen=True, eq=False)
