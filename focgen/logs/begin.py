@@ -31,6 +31,11 @@ class Begin:
         """Whether nothing ever happened before."""
         return self.levels == (0.0,)
 
+    @property
+    def guessed(self) -> bool:
+        """Whether no log shows anything of what was before, though something was."""
+        return not (self.at_rest or self.known) and self.after is None
+
     def samples(self, h: float) -> Array:
         """The signal every ``h`` s up to the sample before the first, from where it was constant for ever; at
         least one.

@@ -105,8 +105,8 @@ def _tell(run: Run) -> _Told:
     kept = [s + len(past) + np.arange(n) for s, past, n in zip(starts, pasts, lengths)]
     by_itself = tuple(gap is None for gap in gaps)
     stands = tuple(place for place, own in zip(run.stands, by_itself) if own)
-    long = replace(run, rest=rest, clock=np.concatenate(clock), begins=(), stands=stands)
-    long = replace(long, guessed=_guessed(run, starts, pasts))
+    guessed = _guessed(run, starts, pasts)
+    long = replace(run, rest=rest, clock=np.concatenate(clock), begins=(), stands=stands, guessed=guessed)
     duration = max(run.duration, h * max(b - a for a, b in long.spans))
     return _Told(tuple(zip(pasts, sooner)), by_itself, replace(long, duration=duration), np.concatenate(kept))
 
@@ -116,7 +116,7 @@ def _guessed(run: Run, starts: Array, pasts: Sequence[Array]) -> tuple[tuple[int
     one as well."""
     ahead, found = dict(run.guessed), []
     for begin, (a, _), start, past in zip(run.begins, run.spans, starts, pasts):
-        if begin != REST and not begin.known and begin.after is None:
+        if begin.guessed:
             found.append((int(start), int(start) + len(past) + ahead.get(a, a) - a))
     return tuple(found)
 

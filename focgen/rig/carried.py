@@ -30,7 +30,7 @@ def carried(chain: Chain, log: Experiment, entry: str, begin: Begin, last: str) 
     past = begin.samples(log.sample_time)
     ahead = replace(begin, levels=begin.levels[:1], ago=())
     run = Run.of([len(past) + FIRST], [log.start], log.sample_time, [ahead])
-    if not begin.known and begin.after is None:
+    if begin.guessed:
         run = replace(run, guessed=((0, len(past)),))
     x = np.concatenate([past, np.asarray(log[entry], float)[:FIRST]])
     made = chain.run(x, ENTERS[entry], last, run, between_of(chain.rig, entry))
