@@ -12,6 +12,7 @@ from focgen.identification.fractional import FractionalFit
 from focgen.identification.identification import ExperimentFit
 from focgen.identification.single import is_step
 from focgen.identification.sure import misfit_of, relative_halves, times_text
+from focgen.identification.zero import resting
 from focgen.logs.between import noise_level
 from focgen.logs.notes import listed
 from focgen.rig.rig import Rig
@@ -19,7 +20,6 @@ from focgen.rig.rig import Rig
 _FALL = 0.5  # of the step: the input comes nearer to 0 by at least this in a release
 _WIDE = 0.3  # of a parameter: an interval wider than this says little
 _ASTRAY = 0.1  # of the output's spread: so far off at rest is more than a zero that is a little off
-_MOVED = 0.1  # of its step: the input has left its rest
 _WORSE = 0.01  # of GOF: by so much more a rig is visibly worse than the single fits
 
 
@@ -104,8 +104,7 @@ def _astray(excitations: Sequence[Excitation], fit: FractionalFit) -> list[str]:
 
 def _off_at_rest(x: Excitation, made: Array) -> float:
     """By how much a fit (n,) misses the output while the input rests, 0 where noise explains it."""
-    moved = np.flatnonzero(np.abs(x.pressure - x.before) > _MOVED * abs(x.level - x.before))
-    rest = int(moved[0]) // 2 if len(moved) and x.rest_shown and not x.begins_up else 0
+    rest = resting(x)
     if rest < 2:
         return 0.0
     off = float(np.mean((x.measured - made)[:rest]))

@@ -27,6 +27,7 @@ from focgen.identification.remarks import remarks_of
 from focgen.identification.single import fit_each, is_step
 from focgen.identification.stages import StageFit, identify_stage
 from focgen.identification.sure import actuator_uncertainty, check_determined, is_compromise, with_stages
+from focgen.identification.zero import shared_zero
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import listed
 from focgen.logs.rates import at_one_rate
@@ -93,8 +94,7 @@ def identify(
     check_bounded(replace(nominal, actuator=None), longest(experiments))
     found = {stage: identify_stage(experiments, stage) for stage in stages if stage != "actuator"}
     ranges, told = seen_ranges(nominal.ranges, experiments)
-    zero = 0.0 if "actuator" in stages else nominal.zero  # offsets are each experiment's own
-    new = _with_stages(replace(nominal, ranges=ranges, effects=(), zero=zero), found)
+    new = _with_stages(replace(nominal, ranges=ranges, effects=()), found)
     if "actuator" in stages:
         result = _actuator(experiments, others, new, gain_degree, delay, integer)
     else:
@@ -157,16 +157,18 @@ def _actuator(
     excitations = [x.bare() for x in excitations]  # a long log's spectra are large
     fits, failed = fit_each(excitations, fit.pasts, fit.delay, integer)
     joint, compromise = _joint(excitations, fit, fits), is_compromise(excitations, fit)
+    zero, of_sensor = shared_zero(excitations, fit), excitations[0].fitted_role == "output"
     new = replace(
         rig,
-        actuator=Actuator(joint.T, joint.alpha, joint.gain),
+        actuator=Actuator(joint.T, joint.alpha, joint.gain, 0.0 if of_sensor else zero),
+        zero=zero if of_sensor else rig.zero,
         delays=replace(rig.delays, actuator=joint.delay),
         uncertainty=replace(rig.uncertainty, actuator=actuator_uncertainty(excitations, fit, compromise)),
     )
     quality, criterion = _compared(excitations, fits, joint)
     shown = _shown(others, new)
     warnings = warnings_of(excitations, fit, fits, failed, quality)
-    told = lowered + _told(experiments, excitations)
+    told = lowered + _told(experiments, excitations) + _zero_told(zero, excitations[0])
     if compromise:
         told += (_COMPROMISE,)
     return Identification(tuple(fits), joint, new, quality, criterion, warnings, told, shown)
@@ -185,6 +187,14 @@ def _told(experiments: Sequence[Experiment], excitations: list[Excitation]) -> t
         verb = "begins with its step" if len(begun) == 1 else "each begin with their step"
         told.append(f"{listed(begun)} {verb}: taken as at rest at 0 before")
     return tuple(told)
+
+
+def _zero_told(zero: float, x: Excitation) -> tuple[str, ...]:
+    if not zero:
+        return ()
+    stage = "sensor" if x.fitted_role == "output" else "actuator"
+    held = f"where the {x.input_role} is 0 the {x.fitted_role} is {zero:g}"
+    return (f"{held}, in all experiments together: written as the offset of the {stage}",)
 
 
 def _prepared(experiments: Sequence[Experiment], rig: Rig, powers: int) -> list[Excitation]:

@@ -1,0 +1,60 @@
+"""The output's zero: what it reads where K(p) p is 0, as far as all experiments agree on one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.stats import t as student
+
+from focgen.arrays import Array
+from focgen.identification.digits import told_value
+from focgen.identification.excitation import Excitation
+from focgen.identification.fractional import FractionalFit
+from focgen.identification.noise import ResidualModel
+from focgen.logs.between import noise_level
+
+_MOVED = 0.1  # of its step: the input has left its rest
+_LITTLE = 0.01  # of the output's spread: a zero below this is no part of a rig
+
+
+def shared_zero(excitations: Sequence[Excitation], fit: FractionalFit) -> float:
+    """The zero of the fitted signal, its units; 0 where it is little, or where experiments with a zero of
+    their own each do not show a common one.
+
+    A log that rests without input reads its zero there, whatever offset the fit gives it. Any other log has
+    the fit's offset, less what K(p) p holds before its first sample. One zero is that of all where their mean
+    lies outside the 95 % interval about 0, by noise and by how the experiments differ.
+    """
+    pairs = [_zero_of(i, x, fit) for i, x in enumerate(excitations)]
+    zeros, noise = np.array(pairs).T
+    mean, count = float(np.mean(zeros)), len(zeros)
+    half = 1.96 * float(np.linalg.norm(noise)) / count
+    if count > 1:
+        scatter = float(np.std(zeros, ddof=1)) / np.sqrt(count)
+        half = max(half, float(student.ppf(0.975, count - 1)) * scatter)
+    spread = float(np.median([x.spread for x in excitations]))
+    return told_value(mean, half) if abs(mean) > max(half, _LITTLE * spread) else 0.0
+
+
+def resting(x: Excitation) -> int:
+    """How many first samples show the output where the input still rests at 0; half of those before it moves,
+    for the other half may lie ahead of a slow gauge's edge."""
+    moved = np.flatnonzero(np.abs(x.pressure - x.before) > _MOVED * abs(x.level - x.before))
+    shown = len(moved) > 0 and x.rest_shown and not x.begins_up
+    return int(moved[0]) // 2 if shown else 0
+
+
+def _zero_of(i: int, x: Excitation, fit: FractionalFit) -> tuple[float, float]:
+    """An experiment's zero and its standard deviation by noise alone."""
+    count = resting(x) if fit.pasts[i] is None else 0
+    if count >= 2:
+        return float(np.mean(x.measured[:count])), noise_level(x.measured) / np.sqrt(count)
+    held: Array = x.before ** np.arange(1, len(fit.gain) + 1)
+    zero = float(fit.offset[i]) - x.sensor_gain * float(fit.gain @ held)
+    return zero, x.spread * _of_a_mean(fit.residuals[i])
+
+
+def _of_a_mean(model: ResidualModel) -> float:
+    """Standard deviation of the mean of a residual."""
+    return float(np.sqrt(model.variance / model.count) / abs(np.sum(model.a)))
