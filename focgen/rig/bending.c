@@ -79,9 +79,10 @@ static double came(const double *spring, double x)
 
 /* As focgen_modes of kernels.c. */
 void focgen_bent_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a, const double *b0,
-                       const double *b1, const double *pair, double through, int switching, const double *spring, double *z)
+                       const double *b1, const double *pair, double through, int held, int switching, const double *spring,
+                       double *z)
 {
-    double zr = 0.0, zi = 0.0, past = 0.0, last = 0.0, slope, taken;
+    double zr = 0.0, zi = 0.0, past = 0.0, last = 0.0, entered = 0.0, slope, taken;
     int moving = 0;
     for (int k = 0; k < n; k++) {
         if (rest[k]) {
@@ -95,7 +96,10 @@ void focgen_bent_modes(int n, const double *x, double *y, const unsigned char *r
             settle(m, a, b0, b1, past, z);
             zr = gr * past, zi = gi * past;
         }
-        int down = switching && fabs(x[k]) < fabs(last);
+        double enters = entering(x, rest, k, held);
+        if (held && !rest[k]) past += enters - entered; /* it jumped at the sample before, what is taken from it did not */
+        entered = enters;
+        int down = switching && fabs(enters) < fabs(last);
         const double *A = a + down * m, *B0 = b0 + down * m, *B1 = b1 + down * m, *P = pair + 6 * down;
         double still = P[0] * zr - P[1] * zi + P[2] * past, gain = through + P[4];
         for (int i = 0; i < m; i++) {
@@ -103,8 +107,8 @@ void focgen_bent_modes(int n, const double *x, double *y, const unsigned char *r
             still += z[i];
             gain += B1[i];
         }
-        last = y[k] = moved(spring, still, gain, x[k], last, &moving, &taken);
-        double now = x[k] - taken;
+        last = y[k] = moved(spring, still, gain, enters, last, &moving, &taken);
+        double now = enters - taken;
         for (int i = 0; i < m; i++) z[i] += B1[i] * now;
         turn(P, past, now, &zr, &zi);
         past = now;

@@ -14,6 +14,7 @@ from focgen.rig import chamber, lags, linear, solved, uneven
 from focgen.rig import plant as plants
 from focgen.rig.begun import from_there, past_of, with_past
 from focgen.rig.changeable import IN_STEPS
+from focgen.rig.courses import sharpened
 from focgen.rig.delay import delayed
 from focgen.rig.dynamics import FREE, SAME, STEADY, UNCHANGED, Dynamics, Lever, Pace
 from focgen.rig.effects import EQUATIONS, Run
@@ -242,10 +243,10 @@ def _actuator(
         steps = _yielding(steps, actuator, weak, dynamics, lever, between)
         return [*zero, *drive, *steps]
     line = (actuator.gain, lambda x, run: actuator.drive(x), None)
-    steps = _swung(actuator.dynamics, dynamics, Between.STRAIGHT, delay) or [
-        _lag(1.0, actuator.T, actuator.alpha, dynamics, delay)
+    steps = _swung(actuator.dynamics, dynamics, between, delay) or [
+        _lag(1.0, actuator.T, actuator.alpha, dynamics, between, delay)
     ]
-    return [line, *drive, *_yielding(steps, actuator, weak, dynamics, lever, Between.STRAIGHT)]
+    return [line, *drive, *_yielding(steps, actuator, weak, dynamics, lever, between)]
 
 
 def _yielding(
@@ -295,7 +296,7 @@ def _linear(
         return [_bent(actuator.dynamics, dynamics, between, delay)]
     gain, T, alpha = lag
     borne = replace(dynamics, drag=dynamics.drag * abs(gain), preload=dynamics.preload * abs(gain))
-    return [_lag(gain, T, alpha, borne, delay)]
+    return [_lag(gain, T, alpha, borne, between, delay)]
 
 
 def _choked(
@@ -337,15 +338,19 @@ def _plant(plant: plants.Plant, dynamics: Dynamics, between: Between | bool, del
     return (plant, dynamics, between, delay), act, None
 
 
-def _lag(gain: float, T: float, alpha: float, dynamics: Dynamics, delay: float) -> Step:
+def _lag(
+    gain: float, T: float, alpha: float, dynamics: Dynamics, between: Between | bool, delay: float
+) -> Step:
     if dynamics.loading != 1.0:  # the compiled loops know a pace of the way up, and another's share of that
         T /= dynamics.loading**alpha
         dynamics = replace(dynamics, loading=1.0, unloading=dynamics.unloading / dynamics.loading)
-    return (
-        (gain, T, alpha, dynamics, delay),
-        lambda x, run: respond(gain * x, run.rest, run.h, T, alpha, run.duration, dynamics, delay),
-        None,
-    )
+    held, smooth = between == Between.HELD, between == Between.SMOOTH
+
+    def act(x: Array, run: Run) -> Array:
+        x = sharpened(np.ascontiguousarray(x, float), run.rest) if smooth else x
+        return respond(gain * x, run.rest, run.h, T, alpha, run.duration, dynamics, delay, held)
+
+    return (gain, T, alpha, dynamics, between, delay), act, None
 
 
 def _bent(transfer: TransferFunction, dynamics: Dynamics, between: Between | bool, delay: float) -> Step:

@@ -25,14 +25,20 @@ void focgen_keep_memory(void)
  * with past inputs alone, z_i <- a_i z_i + (a_i b1_i + b0_i) x[k-1], and so many numbers stay in the processor's registers. */
 enum { SEVERAL = 32 };
 static void undisturbed(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a, const double *b0,
-                        const double *b1, const double *pair, double through)
+                        const double *b1, const double *pair, double through, int held)
 {
     double keeps[SEVERAL] = {0.0}, takes[SEVERAL] = {0.0}, begins[SEVERAL] = {0.0}, z[SEVERAL] = {0.0};
     double zr = 0.0, zi = 0.0, past = 0.0, gr, gi, at_once = through;
+    double p[6] = {pair[0], pair[1], held ? 0.0 : pair[2], held ? 0.0 : pair[3], pair[4], pair[5]};
+    if (held) p[4] += pair[2], p[5] += pair[3];
     gain_at_rest(m, a, b0, b1, pair, through, &gr, &gi);
     settle(m, a, b0, b1, 1.0, begins);
-    for (int i = 0; i < m; i++) keeps[i] = a[i], takes[i] = a[i] * b1[i] + b0[i], begins[i] -= b1[i], at_once += b1[i];
+    for (int i = 0; i < m; i++) {
+        double before = held ? 0.0 : b0[i], now = b1[i] + b0[i] - before;
+        keeps[i] = a[i], takes[i] = a[i] * now + before, begins[i] -= now, at_once += now;
+    }
     for (int k = 0; k < n; k++) {
+        double enters = entering(x, rest, k, held);
         if (rest[k]) {
             past = rest[k] == BALANCED ? x[k] : 0.0;
             for (int i = 0; i < SEVERAL; i++) z[i] = begins[i] * past;
@@ -40,8 +46,8 @@ static void undisturbed(int n, const double *x, double *y, const unsigned char *
         }
         double sum = 0.0;
         for (int i = 0; i < SEVERAL; i++) z[i] = keeps[i] * z[i] + takes[i] * past, sum += z[i];
-        turn(pair, past, x[k], &zr, &zi);
-        past = x[k];
+        turn(p, past, enters, &zr, &zi);
+        past = enters;
         y[k] = at_once * past + sum + zr;
     }
 }
@@ -49,10 +55,10 @@ static void undisturbed(int n, const double *x, double *y, const unsigned char *
 /* focgen_modes where an obstacle, friction or two paces come in. In `z`, too, b1_i x[k] is left out until the next sample: the sum then
  * says what the output is without the present input, which stands for itself. */
 static void disturbed(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a, const double *b0,
-                      const double *b1, const double *pair, double through, int switching, double place, double stiffness,
-                      double slide, double stick, double *z)
+                      const double *b1, const double *pair, double through, int held, int switching, double place,
+                      double stiffness, double slide, double stick, double *z)
 {
-    double zr = 0.0, zi = 0.0, past = 0.0, last = 0.0, at_once[2] = {through, through};
+    double zr = 0.0, zi = 0.0, past = 0.0, last = 0.0, entered = 0.0, at_once[2] = {through, through};
     const double *lately = b1;
     int moving = 0;
     for (int i = 0; i < 2 * m; i++) at_once[i >= m] += b1[i];
@@ -70,13 +76,15 @@ static void disturbed(int n, const double *x, double *y, const unsigned char *re
                 zr = gr * past, zi = gi * past, last = gain * past;
             }
         }
-        double now = x[k], sum = 0.0;
+        double now = entering(x, rest, k, held), sum = 0.0, since = past;
+        if (held && !rest[k]) since += now - entered; /* what enters jumped at the sample before, what is taken from it did not */
+        entered = now;
         int down = switching && fabs(now) < fabs(last);
         const double *A = a + down * m, *B0 = b0 + down * m, *P = pair + 6 * down;
-        for (int i = 0; i < m; i++) z[i] = A[i] * (z[i] + lately[i] * past) + B0[i] * past, sum += z[i];
+        for (int i = 0; i < m; i++) z[i] = A[i] * (z[i] + lately[i] * past) + B0[i] * since, sum += z[i];
         lately = b1 + down * m;
         if (stiffness > 0.0 || stick > 0.0) {
-            double still = sum + P[0] * zr - P[1] * zi + P[2] * past, gain = at_once[down] + P[4];
+            double still = sum + P[0] * zr - P[1] * zi + P[2] * since, gain = at_once[down] + P[4];
             double pushed = stiffness > 0.0 && last > place ? stiffness * (last - place) : 0.0;
             double borne = now - pushed - (last - still) / gain; /* what stands still takes from x */
             if (stick > 0.0 && fabs(borne) <= (moving ? slide : stick)) {
@@ -87,7 +95,7 @@ static void disturbed(int n, const double *x, double *y, const unsigned char *re
                 if (stiffness > 0.0 && beyond > 0.0) now -= stiffness * beyond;
             }
         }
-        turn(P, past, now, &zr, &zi);
+        turn(P, since, now, &zr, &zi);
         past = now;
         last = y[k] = at_once[down] * now + sum + zr;
     }
@@ -99,8 +107,9 @@ static void filled(int m, const double *rows, double *to)
     for (int i = 0; i < 2 * SEVERAL; i++) to[i] = i % SEVERAL < m ? rows[i / SEVERAL * m + i % SEVERAL] : 0.0;
 }
 
-/* Sum of first-order modes, input linear between samples (first-order hold), and one complex mode pair.
- * z_i <- a_i z_i + b0_i x[k-1] + b1_i x[k];  y = through x + sum(z) + Re(pair).
+/* Sum of first-order modes and one complex mode pair; the input runs in lines between samples (first-order hold), or is `held`.
+ * z_i <- a_i z_i + b0_i x[k-1] + b1_i x[k];  y = through x + sum(z) + Re(pair). Held, x[k-1] stands for both and what is taken from x
+ * still runs in lines.
  * Coefficients come twice, for loading (first m) and unloading (next m): unloading is x[k] < y[k-1] where x > 0.
  * pair[s] = {a_re, a_im, b0_re, b0_im, b1_re, b1_im} for s = 0, 1.
  * Beyond y = `place` an obstacle takes `stiffness` (y - place) from x: y, linear in the present x, is solved for.
@@ -108,16 +117,17 @@ static void filled(int m, const double *rows, double *to)
  * more than `slide`, and than `stick` where nothing moved before. No more than SEVERAL modes are run as so many, which the compiler
  * unrolls. */
 void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a, const double *b0, const double *b1,
-                  const double *pair, double through, int switching, double place, double stiffness, double slide, double stick, double *z)
+                  const double *pair, double through, int held, int switching, double place, double stiffness, double slide, double stick,
+                  double *z)
 {
     double A[2 * SEVERAL], B0[2 * SEVERAL], B1[2 * SEVERAL], Z[SEVERAL];
     if (m > SEVERAL) {
-        disturbed(n, x, y, rest, m, a, b0, b1, pair, through, switching, place, stiffness, slide, stick, z);
+        disturbed(n, x, y, rest, m, a, b0, b1, pair, through, held, switching, place, stiffness, slide, stick, z);
     } else if (switching || stiffness > 0.0 || stick > 0.0) {
         filled(m, a, A), filled(m, b0, B0), filled(m, b1, B1);
-        disturbed(n, x, y, rest, SEVERAL, A, B0, B1, pair, through, switching, place, stiffness, slide, stick, Z);
+        disturbed(n, x, y, rest, SEVERAL, A, B0, B1, pair, through, held, switching, place, stiffness, slide, stick, Z);
     } else {
-        undisturbed(n, x, y, rest, m, a, b0, b1, pair, through);
+        undisturbed(n, x, y, rest, m, a, b0, b1, pair, through, held);
     }
 }
 

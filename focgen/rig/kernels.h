@@ -3,8 +3,8 @@ enum { BALANCED = 2 };
 enum { TABLES = 50, COUNTS = 12 }; /* of a plant, and numbers that each has of a step */
 void focgen_keep_memory(void);
 void focgen_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a,
-    const double *b0, const double *b1, const double *pair, double through, int switching, double place,
-    double stiffness, double slide, double stick, double *z);
+    const double *b0, const double *b1, const double *pair, double through, int held, int switching, double
+    place, double stiffness, double slide, double stick, double *z);
 void focgen_lag(int n, const double *x, double *y, const unsigned char *rest, const double *up, const
     double *down);
 void focgen_chamber(int n, const double *x, double *y, const unsigned char *rest, double h, const double
@@ -36,22 +36,22 @@ void focgen_plant(int n, const double *x, double *y, const unsigned char *rest, 
     double *bend, const double *twist, int order, int base, int fine, int last, int kept, const double *numbers,
     double *tables);
 void focgen_bent_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a,
-    const double *b0, const double *b1, const double *pair, double through, int switching, const double
+    const double *b0, const double *b1, const double *pair, double through, int held, int switching, const double
     *spring, double *z);
 void focgen_bent_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double *b,
     const double *c, const double *a, const double *spring, double *w);
 void focgen_paced_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a,
-    const double *b0, const double *b1, const double *pair, double through, int by, const double *pace, const
+    const double *b0, const double *b1, const double *pair, double through, int held, int by, const double *pace, const
     double *share, double *z);
 void focgen_paced_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double *b,
     const double *c, const double *a, int by, const double *pace, const double *share, double *w);
 void focgen_levered_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double
-    *a, const double *b0, const double *b1, const double *pair, double through, const double *lever, double
+    *a, const double *b0, const double *b1, const double *pair, double through, int held, const double *lever, double
     *z);
 void focgen_levered_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double
     *b, const double *a, const double *lever, double *w);
 void focgen_weak_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a,
-    const double *b0, const double *b1, const double *pair, double through, int by, const double *wear, const
+    const double *b0, const double *b1, const double *pair, double through, int held, int by, const double *wear, const
     double *given, double *z);
 void focgen_weak_filter(int n, const double *x, double *y, const unsigned char *rest, int m, const double *b,
     const double *c, const double *a, int by, const double *wear, const double *given, double *w);

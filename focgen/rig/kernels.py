@@ -81,9 +81,11 @@ def modes(
     stiffness: float = 0.0,
     slide: float = 0.0,
     stick: float = 0.0,
+    held: bool = False,
 ) -> Array:
     """Sum of first-order modes; ``a``, ``b0``, ``b1`` (2, m) and ``pair`` (2, 6), rows loading and
-    unloading; beyond ``place`` an obstacle takes ``stiffness`` times how far from ``x``."""
+    unloading; beyond ``place`` an obstacle takes ``stiffness`` times how far from ``x``, which runs in lines
+    between samples, or is ``held``."""
     *pointers, room = _doubles(a, b0, b1, pair, np.empty(a.shape[1]))
     return _call(
         "focgen_modes",
@@ -92,6 +94,7 @@ def modes(
         a.shape[1],
         *pointers,
         float(through),
+        int(held),
         int(switching),
         float(place),
         float(stiffness),
@@ -232,6 +235,7 @@ def bent_modes(
     through: float,
     switching: bool,
     spring: Sequence[float],
+    held: bool = False,
 ) -> Array:
     """As :func:`modes`, with the input less what ``spring`` (10,) takes: see ``bending.c``."""
     *pointers, own, room = _doubles(a, b0, b1, pair, np.array(spring, float), np.empty(a.shape[1]))
@@ -242,6 +246,7 @@ def bent_modes(
         a.shape[1],
         *pointers,
         float(through),
+        int(held),
         int(switching),
         own,
         room,
@@ -258,11 +263,13 @@ Slowness = tuple[int, Sequence[float], Array]
 """What an uneven pace depends on, {gain, fast, rate, scale, curve}, and the share (n,) of time: pace.c."""
 
 
-def paced_modes(
-    x: Array, rest: Bytes, a: Array, b0: Array, b1: Array, pair: Array, through: float, slowness: Slowness
-) -> Array:
-    """As :func:`modes` of a row (m,) or (6,) each, of a stage whose pace is not even."""
-    return _row_with("focgen_paced_modes", x, rest, (a, b0, b1, pair, through), slowness)
+Row = tuple[Array, Array, Array, Array, float]
+"""Modes of a stage: a, b0, b1 (m,), the pair (6,), and what passes at once."""
+
+
+def paced_modes(x: Array, rest: Bytes, row: Row, held: bool, slowness: Slowness) -> Array:
+    """As :func:`modes` of one row, of a stage whose pace is not even."""
+    return _row_with("focgen_paced_modes", x, rest, row, held, slowness)
 
 
 def paced_rational(x: Array, rest: Bytes, b: Array, c: Array, a: Array, slowness: Slowness) -> Array:
@@ -271,12 +278,12 @@ def paced_rational(x: Array, rest: Bytes, b: Array, c: Array, a: Array, slowness
     return _filter_with("focgen_paced_filter", x, rest, (b, c, a), slowness)
 
 
-def _row_with(name: str, x: Array, rest: Bytes, row: tuple[Any, ...], law: tuple[Any, ...]) -> Array:
+def _row_with(name: str, x: Array, rest: Bytes, row: Row, held: bool, law: tuple[Any, ...]) -> Array:
     """A loop over modes that take what enters as a ``law`` says: by what, its numbers, and one a sample."""
     *modes, through = row
     by, numbers, course = law
     *pointers, own, each, room = _doubles(*modes, np.array(numbers, float), course, np.empty(len(modes[0])))
-    return _call(name, x, rest, len(modes[0]), *pointers, float(through), by, own, each, room)
+    return _call(name, x, rest, len(modes[0]), *pointers, float(through), int(held), by, own, each, room)
 
 
 def _filter_with(name: str, x: Array, rest: Bytes, sides: tuple[Array, ...], law: tuple[Any, ...]) -> Array:
@@ -287,13 +294,12 @@ def _filter_with(name: str, x: Array, rest: Bytes, sides: tuple[Array, ...], law
     return _call(name, x, rest, order, *tables, by, own, each, room)
 
 
-def levered_modes(
-    x: Array, rest: Bytes, a: Array, b0: Array, b1: Array, pair: Array, through: float, lever: Sequence[float]
-) -> Array:
-    """As :func:`modes` of a row (m,) or (6,) each, with the input as strong as ``lever`` (3,) says:
-    ``lever.c``."""
-    *pointers, own, room = _doubles(a, b0, b1, pair, np.array(lever, float), np.empty(len(a)))
-    return _call("focgen_levered_modes", x, rest, len(a), *pointers, float(through), own, room)
+def levered_modes(x: Array, rest: Bytes, row: Row, held: bool, lever: Sequence[float]) -> Array:
+    """As :func:`modes` of one row, with the input as strong as ``lever`` (3,) says: ``lever.c``."""
+    *modes, through = row
+    count = len(row[0])
+    *pointers, own, room = _doubles(*modes, np.array(lever, float), np.empty(count))
+    return _call("focgen_levered_modes", x, rest, count, *pointers, float(through), int(held), own, room)
 
 
 def levered_rational(x: Array, rest: Bytes, b: Array, a: Array, lever: Sequence[float]) -> Array:
@@ -306,11 +312,9 @@ Wear = tuple[int, Sequence[float], Array]
 """What a spring gives way with, {growth, scale, before, gain}, and what else (n,) it is: see ``weak.c``."""
 
 
-def weak_modes(
-    x: Array, rest: Bytes, a: Array, b0: Array, b1: Array, pair: Array, through: float, wear: Wear
-) -> Array:
-    """As :func:`modes` of a row (m,) or (6,) each, of an actuator whose spring gives way."""
-    return _row_with("focgen_weak_modes", x, rest, (a, b0, b1, pair, through), wear)
+def weak_modes(x: Array, rest: Bytes, row: Row, held: bool, wear: Wear) -> Array:
+    """As :func:`modes` of one row, of an actuator whose spring gives way."""
+    return _row_with("focgen_weak_modes", x, rest, row, held, wear)
 
 
 def weak_rational(x: Array, rest: Bytes, b: Array, c: Array, a: Array, wear: Wear) -> Array:

@@ -29,9 +29,9 @@ static double driven(const double *lever, double still, double gain, double x, d
 
 /* As focgen_modes of kernels.c. */
 void focgen_levered_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a, const double *b0,
-                          const double *b1, const double *pair, double through, const double *lever, double *z)
+                          const double *b1, const double *pair, double through, int held, const double *lever, double *z)
 {
-    double zr = 0.0, zi = 0.0, past = 0.0, last = 0.0, pull = 1.0, direct = through + pair[4];
+    double zr = 0.0, zi = 0.0, past = 0.0, last = 0.0, entered = 0.0, pull = 1.0, direct = through + pair[4];
     for (int i = 0; i < m; i++) direct += b1[i];
     for (int k = 0; k < n; k++) {
         if (rest[k]) {
@@ -45,9 +45,12 @@ void focgen_levered_modes(int n, const double *x, double *y, const unsigned char
             settle(m, a, b0, b1, past, z);
             zr = gr * past, zi = gi * past;
         }
+        double enters = entering(x, rest, k, held);
+        if (held && !rest[k]) past += (enters - entered) * pull; /* it jumped at the sample before, the response did not */
+        entered = enters;
         double still = decay(m, a, b0, pair, past, zr, zi, z);
-        last = y[k] = driven(lever, still, direct, x[k], last, &pull);
-        double now = x[k] * pull;
+        last = y[k] = driven(lever, still, direct, enters, last, &pull);
+        double now = enters * pull;
         enter(m, b1, pair, past, now, &zr, &zi, z);
         past = now;
     }

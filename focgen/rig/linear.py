@@ -127,12 +127,12 @@ def _at_samples(
     lag = single_lag(transfer)
     if lag:
         gain, T, alpha = lag
-        return gain * respond(x, rest, h, T, alpha, duration)
+        return gain * respond(x, rest, h, T, alpha, duration, held=held)
     longest = about_as_long(duration)
     rows, pair, through = _tables(transfer, h, longest)
-    made = kernels.modes(x, rest, *rows, pair, through, switching=False)
+    made = kernels.modes(x, rest, *rows, pair, through, switching=False, held=held)
     modes = modes_of(transfer, h, longest)
-    return settled(made + swings(x, rest, h, modes), x, rest, _missing(transfer, modes))
+    return settled(made + swings(x, rest, h, modes, held), x, rest, _missing(transfer, modes))
 
 
 def _missing(transfer: TransferFunction, modes: Modes) -> float:
@@ -150,9 +150,9 @@ def _between(
     if lag:
         gain, T, alpha = lag
         modes = fractional_lag(T, alpha, h, longest)
-        return gain * settled(between(x, rest, h, modes, share), x, rest, 1.0 - modes.gain)
+        return gain * settled(between(x, rest, h, modes, share, held), x, rest, 1.0 - modes.gain)
     modes = modes_of(transfer, h, longest)
-    return settled(between(x, rest, h, modes, share), x, rest, _missing(transfer, modes))
+    return settled(between(x, rest, h, modes, share, held), x, rest, _missing(transfer, modes))
 
 
 def holds_level(transfer: TransferFunction) -> bool:

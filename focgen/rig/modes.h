@@ -25,6 +25,13 @@ static void turn(const double *pair, double past, double now, double *re, double
     *re = on;
 }
 
+/* What of x enters at sample k: x runs in lines there, or is `held` at what it was a sample ago. */
+static inline double entering(const double *x, const unsigned char *rest, int k, int held)
+{
+    if (!held) return x[k];
+    return !rest[k] ? x[k - 1] : rest[k] == BALANCED ? x[k] : 0.0;
+}
+
 /* The modes one sample on without the present input; returns what the response is without it. */
 static inline double decay(int m, const double *a, const double *b0, const double *pair, double past, double re, double im, double *z)
 {

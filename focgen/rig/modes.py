@@ -96,9 +96,10 @@ def respond(
     duration: float,
     dynamics: Dynamics = UNCHANGED,
     delay: float = 0.0,
+    held: bool = False,
 ) -> Array:
-    """The response of 1/(T s^alpha + 1) to ``x`` (n,), linear between samples of ``h`` s, later by ``delay``
-    s; ``rest`` (n,) is true where an experiment begins, none longer than ``duration`` s.
+    """The response of 1/(T s^alpha + 1) to ``x`` (n,), linear or ``held`` between samples of ``h`` s, later
+    by ``delay`` s; ``rest`` (n,) is true where an experiment begins, none longer than ``duration`` s.
 
     With changed ``dynamics`` the response, too, counts as linear between samples: the delay is exact there in
     whole samples only. Friction bears the springs and the springpot from sample to sample: y stays where it
@@ -108,18 +109,18 @@ def respond(
         whole, part = split_delay(delay, h)
         if part:
             modes = fractional_lag(T, alpha, h, about_as_long(duration))
-            made = settled(between(x, rest, h, modes, 1.0 - part), x, rest, 1.0 - modes.gain)
+            made = settled(between(x, rest, h, modes, 1.0 - part, held), x, rest, 1.0 - modes.gain)
             return shifted(made, rest, whole)
     if delay:
-        return delayed(respond(x, rest, h, T, alpha, duration, dynamics), rest, h, delay)
+        return delayed(respond(x, rest, h, T, alpha, duration, dynamics, held=held), rest, h, delay)
     unloading, longest = dynamics.unloading, about_as_long(duration)
     a, b0, b1, pair, through = tables(T, alpha, h, longest, unloading)
     switching = unloading != 1.0
     if dynamics.changed & {"bend", "loss", "preload"} or dynamics.place < 0.0:
-        made = kernels.bent_modes(x, rest, a, b0, b1, pair, through, switching, dynamics.bending())
+        made = kernels.bent_modes(x, rest, a, b0, b1, pair, through, switching, dynamics.bending(), held)
     else:
-        obstacle = dynamics.place, dynamics.stiffness
-        made = kernels.modes(x, rest, a, b0, b1, pair, through, switching, *obstacle, *dynamics.drag.held)
+        borne = dynamics.place, dynamics.stiffness, *dynamics.drag.held
+        made = kernels.modes(x, rest, a, b0, b1, pair, through, switching, *borne, held)
     return settled(made, x, rest, 1.0 - fractional_lag(T, alpha, h, longest).gain)
 
 
@@ -140,25 +141,26 @@ def settled(made: Array, x: Array, rest: Bytes, missing: float) -> Array:
     return made
 
 
-def between(x: Array, rest: Bytes, h: float, modes: Modes, share: float) -> Array:
+def between(x: Array, rest: Bytes, h: float, modes: Modes, share: float, held: bool = False) -> Array:
     """The response to ``x`` (n,) at the ``share``, 0 … 1, of the way to each sample from the one before.
 
     What a mode was a sample ago decays over that share, which is one more factor of its input; the rest is
-    the answer to the straight line since.
+    the answer to the straight line since, or to what is ``held``.
     """
     rates, pole = np.append(-modes.rates, modes.pole), modes.pole
     gains = np.append(modes.weights / modes.rates, -modes.residue / pole)
     decay, past, now = hold(share * h * rates)
     before, after = ((gains * c).sum().real for c in (past, now))
-    before, after = before + (1.0 - share) * (after + modes.through), share * (after + modes.through)
+    on = 0.0 if held else share  # the way to the next sample
+    before, after = before + (1.0 - on) * (after + modes.through), on * (after + modes.through)
     _, b0, b1 = hold(h * rates)
     weight = gains * decay
     rows = [np.exp(h * rates[:-1].real), (weight * b0)[:-1].real, (weight * b1)[:-1].real]
     pair = [np.exp(h * pole), (weight * b0)[-1], (weight * b1)[-1]]
     a, past, now, twins = (np.stack([row, row]) for row in (*rows, _parts(pair)))
-    kept = kernels.modes(x, rest, a, past, now, twins, 0.0, switching=False)
+    kept = kernels.modes(x, rest, a, past, now, twins, 0.0, switching=False, held=held)
     made: Array = shifted(kept + before * x, rest, 1) + after * x
-    return made + sum(between(x, rest, h, pair, share) for pair in modes.further)
+    return made + sum(between(x, rest, h, pair, share, held) for pair in modes.further)
 
 
 @lru_cache(maxsize=256)
@@ -183,12 +185,12 @@ def speeded(modes: Modes, h: float, speed: float) -> tuple[Array, Array, Array, 
     return a, gain * b0, gain * b1, _parts([pa, scale * p0, scale * p1])
 
 
-def swings(x: Array, rest: Bytes, h: float, modes: Modes) -> Array | float:
+def swings(x: Array, rest: Bytes, h: float, modes: Modes, held: bool = False) -> Array | float:
     """What the further pairs of ``modes`` make of ``x`` (n,)."""
     made: Array | float = 0.0
     for pair in modes.further:
         a, b0, b1, both = (np.stack([row, row]) for row in speeded(pair, h, 1.0))
-        made = made + kernels.modes(x, rest, a, b0, b1, both, 0.0, switching=False)
+        made = made + kernels.modes(x, rest, a, b0, b1, both, 0.0, switching=False, held=held)
     return made
 
 

@@ -33,11 +33,12 @@ static double paced(int by, const double *pace, double still, double first, doub
     return y;
 }
 
-/* As focgen_modes of kernels.c, where the modes have the stage's gain, pace[0]; x runs in lines. */
+/* As focgen_modes of kernels.c, where the modes have the stage's gain, pace[0]. */
 void focgen_paced_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a, const double *b0,
-                        const double *b1, const double *pair, double through, int by, const double *pace, const double *share, double *z)
+                        const double *b1, const double *pair, double through, int held, int by, const double *pace, const double *share,
+                        double *z)
 {
-    double zr = 0.0, zi = 0.0, past = 0.0, last = 0.0, w = 1.0, direct = through + pair[4];
+    double zr = 0.0, zi = 0.0, past = 0.0, last = 0.0, entered = 0.0, w = 1.0, direct = through + pair[4];
     for (int i = 0; i < m; i++) direct += b1[i];
     for (int k = 0; k < n; k++) {
         if (rest[k]) {
@@ -50,10 +51,13 @@ void focgen_paced_modes(int n, const double *x, double *y, const unsigned char *
             settle(m, a, b0, b1, past, z);
             zr = gr * past, zi = gi * past;
         }
+        double enters = entering(x, rest, k, held);
+        if (held && !rest[k]) past += (enters - entered) * w; /* it jumped at the sample before, the response did not */
+        entered = enters;
         double still = decay(m, a, b0, pair, past, zr, zi, z);
         if (!by) w = share[k];
-        last = y[k] = paced(by, pace, still, direct, direct, x[k], last, &w);
-        double now = x[k] * w + last / pace[0] * (1.0 - w);
+        last = y[k] = paced(by, pace, still, direct, direct, enters, last, &w);
+        double now = enters * w + last / pace[0] * (1.0 - w);
         enter(m, b1, pair, past, now, &zr, &zi, z);
         past = now;
     }

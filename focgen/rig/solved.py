@@ -49,7 +49,7 @@ def run_paced(
         return kernels.paced_rational(x, rest, *_sides(transfer, h, between), slowness)
     gain, row, missing = row_of(transfer, h, about_as_long(duration))
     by, (own, *pace), share = slowness
-    made = kernels.paced_modes(x, rest, *row, (by, (own / gain, *pace), share))
+    made = kernels.paced_modes(x, rest, row, between == Between.HELD, (by, (own / gain, *pace), share))
     return gain * settled(made, x, rest, missing)
 
 
@@ -69,7 +69,8 @@ def run_levered(
         own = lever.first, lever.second, lever.scale
         return kernels.levered_rational(x, rest, *discrete(transfer, h, between == Between.HELD), own)
     gain, row, missing = row_of(transfer, h, about_as_long(duration))
-    made = gain * kernels.levered_modes(x, rest, *row, (lever.first, lever.second, lever.scale / gain))
+    own = lever.first, lever.second, lever.scale / gain
+    made = gain * kernels.levered_modes(x, rest, row, between == Between.HELD, own)
     return settled(made, x * lever.strength(made), rest, gain * missing)
 
 
@@ -90,7 +91,8 @@ def run_weak(
     gain, row, missing = row_of(transfer, h, about_as_long(duration))
     by, (growth, scale, before, own), given = wear
     per = abs(gain)
-    made = kernels.weak_modes(x, rest, *row, (by, (growth, scale / per, before / per, own / gain), given))
+    wear = by, (growth, scale / per, before / per, own / gain), given
+    made = kernels.weak_modes(x, rest, row, between == Between.HELD, wear)
     entered = made / (own / gain - missing)  # of what rests
     return gain * settled(made, entered, rest, missing)
 

@@ -60,11 +60,12 @@ static void wears(int by, Worn *worn, double y)
     worn->level = fabs(y);
 }
 
-/* As focgen_modes of kernels.c; x runs in lines. */
+/* As focgen_modes of kernels.c. */
 void focgen_weak_modes(int n, const double *x, double *y, const unsigned char *rest, int m, const double *a, const double *b0,
-                       const double *b1, const double *pair, double through, int by, const double *wear, const double *given, double *z)
+                       const double *b1, const double *pair, double through, int held, int by, const double *wear, const double *given,
+                       double *z)
 {
-    double zr = 0.0, zi = 0.0, past = 0.0, last = 0.0, s, gain = wear[3], direct = through + pair[4];
+    double zr = 0.0, zi = 0.0, past = 0.0, last = 0.0, entered = 0.0, s, gain = wear[3], direct = through + pair[4];
     Worn worn = {0.0, wear[2], 0.0, 1.0};
     for (int i = 0; i < m; i++) direct += b1[i];
     for (int k = 0; k < n; k++) {
@@ -79,10 +80,13 @@ void focgen_weak_modes(int n, const double *x, double *y, const unsigned char *r
             settle(m, a, b0, b1, past, z);
             zr = gr * past, zi = gi * past;
         }
+        double enters = entering(x, rest, k, held);
+        if (held && !rest[k]) past += enters - entered; /* it jumped at the sample before, the response did not */
+        entered = enters;
         double still = decay(m, a, b0, pair, past, zr, zi, z);
-        last = y[k] = yielding(by, wear, given[k], &worn, still + direct * x[k], direct / gain, last, &s);
+        last = y[k] = yielding(by, wear, given[k], &worn, still + direct * enters, direct / gain, last, &s);
         wears(by, &worn, last);
-        double now = x[k] + (1.0 - s) * last / gain;
+        double now = enters + (1.0 - s) * last / gain;
         enter(m, b1, pair, past, now, &zr, &zi, z);
         past = now;
     }
