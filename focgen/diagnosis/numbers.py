@@ -221,8 +221,8 @@ class Numbers:
     )
     unlikely: float = _number(
         0.7,
-        "left at most by an actuator far from the one given; how sure a cause beside it may be, or one that "
-        "parts of the session foretell less of than this in others",
+        "left at most by an actuator far from the one given; how sure a cause beside it may be; how much of "
+        "what causes close parts of the session are to foretell in others",
         "of the mean square, of the confidence",
         "tuning cases",
         _SAME,
@@ -231,9 +231,9 @@ class Numbers:
     smaller: float = _number(
         0.9,
         "how sure a cause may be, of what it would be alone: beside a larger one of its segment or a number "
-        "moved far, or with one of its own at its end",
+        "moved far, with one of its own at its end, or where parts of the session foretell little of others",
         "of the confidence",
-        "50 causes of the former kind on rigs not seen before: 48 right; 14 of the latter: 12",
+        "50 causes of the first kind on rigs not seen before: 48 right; 14 of the third: 12; 13 of the last: 11",
         "not measured",
         "–",
     )

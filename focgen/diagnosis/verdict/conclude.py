@@ -173,7 +173,7 @@ def _found(
     kept, sure = tied(cause.rivals)
     sure = sure * NUMBERS.unlikely if e.strained else sure  # numbers far off explain the same
     sure = sure * NUMBERS.unlikely if summary.stands_for_more or something_unknown_acts(e) else sure
-    sure = sure * NUMBERS.unlikely if summary.follows_these_logs else sure
+    sure = sure * NUMBERS.smaller if summary.follows_these_logs else sure
     trust = min(trust, NUMBERS.smaller) if at_their_ends(cause.rivals[0]) else trust
     sure = sure * _lasting(e, cause) * min(_beside(e, cause), trust)
     total = summary.total or Improvement(0.0, (0.0, 0.0))
