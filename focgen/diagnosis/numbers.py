@@ -230,8 +230,8 @@ class Numbers:
     )
     smaller: float = _number(
         0.9,
-        "how sure a cause may be, of what it would be alone: beside a larger one of its segment or a number "
-        "moved far, with one of its own at its end, or where parts of the session foretell little of others",
+        "how sure a cause may be beside a larger one of its segment or a number moved far, "
+        "with a number at its end, or where parts of the session foretell little of others",
         "of the confidence",
         "50 causes of the first kind on rigs not seen before: 48 right; 14 of the third: 12; 13 of the last: 11",
         "not measured",
