@@ -233,7 +233,7 @@ class Numbers:
         "how sure a cause may be beside a larger one of its segment or a number moved far, "
         "with a number at its end, or where parts of the session foretell little of others",
         "of the confidence",
-        "50 causes of the first kind on rigs not seen before: 48 right; 14 of the third: 12; 13 of the last: 11",
+        "fresh rigs: 48 of 50 of the first kind right, 12 of 14 of the third, 11 of 13 of the last",
         "not measured",
         "–",
     )
