@@ -28,7 +28,7 @@ from focgen.rig.initial import NOTE as ESTIMATED
 from focgen.rig.placed import Placed
 from focgen.rig.response import integrations, longest, response_time
 from focgen.rig.rig import Rig
-from focgen.rig.session import joined, run_of
+from focgen.rig.session import entering, joined, run_of
 from focgen.rig.stages import ENTERS, LEAVES, STAGES
 from focgen.rig.stood import standing
 
@@ -361,9 +361,9 @@ def _shows(
 
 def _made(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment], entry: str, leaves: str) -> Array:
     """What the rig makes (n,) of all experiments, from the input ``entry`` on."""
-    x = joined(logs, entry)
-    chain, run = Chain(rig, tuple(placed)), run_of(logs, entry)
-    made: Array = chain.run(x, ENTERS[entry], leaves, run, between_of(rig, entry))
+    way = between_of(rig, entry)
+    x, chain, run = entering(logs, entry), Chain(rig, tuple(placed)), run_of(logs, entry)
+    made: Array = chain.run(x, ENTERS[entry], leaves, run, way)
     return made
 
 

@@ -28,7 +28,7 @@ from focgen.rig.plausibility import doubts
 from focgen.rig.recalled import with_earlier
 from focgen.rig.response import check_bounded, longest
 from focgen.rig.rig import Rig
-from focgen.rig.session import joined, run_of
+from focgen.rig.session import entering, entry_of, run_of, staircases
 from focgen.rig.stages import LEAVES, STAGES
 from focgen.shown import Shown
 
@@ -119,14 +119,14 @@ def simulate_session(
 ) -> list[dict[str, Array]]:
     """The signals that each experiment should show, by role; ``continues``: after the session the rig's
     effects left. Raises LogError for logs without an input in common."""
-    entry = "command" if all("command" in log for log in logs) else "pressure"
+    entry = entry_of(logs)
     if not all(entry in log for log in logs):
         raise LogError(
             logs[0].name, "has neither command nor pressure throughout", "name an input in [signals]"
         )
     run = run_of(after_session(rig, logs) if continues else logs, entry)
     tap: dict[str, Array] = {}
-    x = joined(logs, entry)
+    x = entering(logs, entry)
     first = "regulator" if entry == "command" else "actuator"
     chain = Chain(rig, tuple(placed_in(rig) if placed is None else placed))
     chain.run(x, first, "sensor", run, between_of(rig, entry), tap)
@@ -134,12 +134,18 @@ def simulate_session(
 
 
 def told_between(rig: Rig, logs: Sequence[Experiment]) -> Rig:
-    """The rig with what a command does between its samples, where the rig does not say it and the logs do:
-    what :func:`between_of` says, unless the output comes much closer to another way."""
-    if rig.between is not None or not all("command" in log and "output" in log for log in logs):
+    """The rig with what its first input does between its samples, where the rig does not say it and the logs
+    do: what :func:`between_of` says, unless the output comes much closer to another way. A pressure runs in
+    lines, and may be held where it only jumps and rests."""
+    entry = entry_of(logs)
+    if rig.between is not None or not all(entry in log and "output" in log for log in logs):
         return rig
-    usual = between_of(rig, "command")
-    ways = [replace(rig, between=way) for way in sorted(Between, key=lambda way: way != usual)]
+    usual, likely = between_of(rig, entry), list(Between)
+    if entry == "pressure":
+        likely = [Between.STRAIGHT] if staircases(logs, entry) is None else [Between.STRAIGHT, Between.HELD]
+    if len(likely) == 1:
+        return rig
+    ways = [replace(rig, between=way) for way in sorted(likely, key=lambda way: way != usual)]
     left = [_left(way, logs) for way in ways]
     closest = int(np.argmin(left))
     return ways[closest] if left[closest] < _CLOSER * left[0] else rig

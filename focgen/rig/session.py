@@ -8,7 +8,13 @@ import numpy as np
 
 from focgen.arrays import Array
 from focgen.logs.experiment import Experiment
+from focgen.logs.staircase import staircase_of
 from focgen.rig.effects import Run
+
+
+def entry_of(logs: Sequence[Experiment]) -> str:
+    """The first input that every log has: the command, else the pressure."""
+    return "command" if all("command" in log for log in logs) else "pressure"
 
 
 def run_of(logs: Sequence[Experiment], entry: str) -> Run:
@@ -22,3 +28,18 @@ def run_of(logs: Sequence[Experiment], entry: str) -> Run:
 def joined(logs: Sequence[Experiment], role: str) -> Array:
     """A signal (n,) of all experiments, one after the other."""
     return np.concatenate([np.asarray(log[role], float) for log in logs])
+
+
+def entering(logs: Sequence[Experiment], role: str) -> Array:
+    """The input (n,) of all experiments. One that is measured, and only jumps and rests, is what its readings
+    are on average from jump to jump: what they scatter is the gauge's."""
+    steps = staircases(logs, role) if role != "command" else None
+    return joined(logs, role) if steps is None else steps
+
+
+def staircases(logs: Sequence[Experiment], role: str) -> Array | None:
+    """The levels (n,) that a signal of all experiments has from jump to jump; None where it does anything
+    else in one of them."""
+    steps = [staircase_of(np.asarray(log[role], float)) for log in logs]
+    kept = [x for x in steps if x is not None]
+    return np.concatenate(kept) if len(kept) == len(steps) else None

@@ -27,7 +27,7 @@ CONSTANTS = {
     "hypotheses/left.py": ["_ERRORS", "_OFF", "_STILL"],
     "hypotheses/level_pace.py": ["_PART"],
     "hypotheses/longer_path.py": ["_HELD", "_KEPT"],
-    "hypotheses/nuisances.py": ["_GAUGE", "_OUT_OF_STEP", "_SMOOTHER"],
+    "hypotheses/nuisances.py": ["_GAUGE", "_HALF", "_OUT_OF_STEP", "_SMOOTHER"],
     "hypotheses/roughly.py": ["_NEAR"],
     "hypotheses/search.py": ["_ADRIFT", "_BENT", "_FAR", "_NEAR", "_QUICK"],
     "hypotheses/seen_through.py": ["_FINELY"],

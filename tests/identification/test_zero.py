@@ -22,7 +22,7 @@ T, ALPHA, GAIN = 1.5, 0.8, (2.0, 0.3)
 PLANT = TransferFunction([(1.0, 0.0)], [(T, ALPHA), (1.0, 0.0)])
 GAUGE = TransferFunction([(0.5, 0.0)], [(0.2, 1.0), (1.0, 0.0)])
 NOISE = 0.004
-SIGNALS, LIKELY = Signals("t", None, "p", None, "y"), Actuator(1.3, 0.9, (2.2, 0.2))
+SIGNALS, LIKELY = Signals("t", "y", pressure="p"), Actuator(1.3, 0.9, (2.2, 0.2))
 RIG = Rig("valve", H, SIGNALS, LIKELY, sensor=GAUGE, between=Between.HELD)
 
 
@@ -72,7 +72,9 @@ def test_zeros_of_each_experiments_own_are_no_zero_of_the_rig(seed):
 def test_the_zero_of_a_fitted_curvature_is_the_actuators():
     rng = np.random.default_rng(3)
     log = logged("e", RESTED, 0.7, rng)
-    rig = Rig("valve", H, Signals("t", None, "p", "k", "y"), RIG.actuator, sensor=GAUGE, zero=0.2)
+    rig = Rig(
+        "valve", H, Signals("t", "y", pressure="p", curvature="k"), RIG.actuator, sensor=GAUGE, zero=0.2
+    )
     read = {"pressure": log["pressure"], "curvature": log["output"] / 0.5, "output": log["output"]}
     seen = Experiment("e", H, read)
     found = identify(rig, [seen], integer=False)
@@ -88,5 +90,5 @@ def test_misfit_is_no_zero():
         y += H / (1.0 if 2.0 * p > y else 1.7) * (2.0 * p - y)
         made[i] = y
     log = Experiment("e", H, {"pressure": drive, "output": made + rng.normal(0.0, NOISE, len(made))})
-    rig = Rig("bellows", H, Signals("t", None, "p", None, "y"), sensor=UNITY)
+    rig = Rig("bellows", H, Signals("t", "y", pressure="p"), sensor=UNITY)
     assert abs(identify(rig, [log], integer=False).rig.zero) < 3.0 * NOISE

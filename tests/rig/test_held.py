@@ -23,7 +23,7 @@ from focgen.rig.rig import Actuator, Delays, LinearActuator, Rig, Signals
 H, HOLD, FINER = 0.1, 25, 20
 LEVELS = np.array([0.0, 2.0, 0.5, 3.0, 1.0, 0.0, 2.5, 1.5])
 X = np.repeat(LEVELS, HOLD)
-SIGNALS = Signals("t", "u", None, None, "y")
+SIGNALS = Signals("t", "y", "u")
 GAIN = (1.2, 0.3)
 CHAIN = TransferFunction([(1.5, 0.0)], [(0.3, 1.4), (0.5, 0.7), (1.0, 0.0)])
 

@@ -1,4 +1,4 @@
-"""What a command does between its samples, as suits what was found."""
+"""What an input does between its samples, as suits what was found."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ _COMPARED = 3  # rivals that experiments are to tell apart
 
 
 def between_anew(rig: Rig, best: Fit, nominal: Fit, weighing: Weighing) -> tuple[Fit, Fit]:
-    """Both fits with the command running between its samples as suits what was found: a nominal rig far from
+    """Both fits with the input running between its samples as suits what was found: a nominal rig far from
     what it models may be suited by another way. That has to leave much less: half a sample more or less may
     make up for a little of whatever a model lacks."""
     segment = best.problem.segment
-    if rig.between is not None or segment.entry != "command" or not best.problem.candidates:
+    if rig.between is not None or len(ways(segment)) == 1 or not best.problem.candidates:
         return best, nominal
     others = [segment.anew(between=way) for way in ways(segment) if way != segment.between]
     tried = [moved_to(best, other, weighing) for other in others]

@@ -91,9 +91,10 @@ class Explanation:
         return self.segment.stages[0] if len(self.segment.stages) == 1 else None
 
     def with_intersample(self, rig: Rig) -> Rig:
-        """``rig`` with what its command does between samples, where that is not as usual."""
-        between = self.segment.between
-        usual = self.segment.entry != "command" or between == between_of(rig, "command")
+        """``rig`` with what its first input does between samples, where that is not as usual."""
+        between, entry = self.segment.between, self.segment.entry
+        first = "pressure" if rig.signals.command is None else "command"
+        usual = entry != first or between == between_of(rig, first)
         return rig if usual else replace(rig, between=Between(between))
 
     def kept_by(self, given: Rig, refitted: Rig) -> bool:

@@ -25,13 +25,15 @@ from focgen.diagnosis.problem.segments import Segment, owner
 from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
 from focgen.rig.rig import Rig
+from focgen.rig.session import entry_of
 
-# of the rig's response, and a sample at most: what columns may be out of step by; more is a delay
-_OUT_OF_STEP = 0.05
+# of the rig's response: what columns may be out of step by; more is a delay. Half a sample is excluded by no
+# log, whose loop may read before it writes, and a whole one is the most
+_OUT_OF_STEP, _HALF = 0.05, 0.5
 _GAUGE = 0.01  # of its reading: by what a gauge may be off without being a fault
 _WAYS = (Between.HELD, Between.STRAIGHT, Between.SMOOTH)  # of a command between its samples
 _SMOOTHER = 0.95  # of the mean square that lines leave: a smooth curve, which takes longer, has to leave less
-_RESTS = 0.5  # of a command's samples at which it rests: then it is no smooth curve
+_RESTS = 0.5  # of an input's samples at which it rests: then it is no smooth curve
 
 
 def uncertain(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
@@ -45,26 +47,31 @@ def problem_of(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Proble
     freely = owner(rig) if owner(rig) in segment.stages else None
     load, response = (scales.levels["load"], scales.levels["response"])
     segment = replace(segment, pace=pace(rig, segment.stages, scales.clocks["response"]))
-    slack = min(1.0, _OUT_OF_STEP * scales.clocks["response"] / segment.fed.run.h)
+    slack = float(np.clip(_OUT_OF_STEP * scales.clocks["response"] / segment.fed.run.h, _HALF, 1.0))
     return Problem(
         segment, NominalParameters(rig, segment.stages, freely, load, response), scales, slack=slack
     )
 
 
 def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
-    """The problem with the command as a staircase, as a polygon or as a smooth curve, whichever the log was,
+    """The problem with the input as a staircase, as a polygon or as a smooth curve, whichever the log was,
     where the rig does not say it: loggers differ."""
-    tried = [segment.between] if segment.entry != "command" else ways(segment)
-    if rig.between is not None:
-        tried = [rig.between]
+    given = rig.between if segment.entry == entry_of(logs) else None
+    tried = ways(segment) if given is None else [given]
     problems = [problem_of(rig, segment.anew(between=way), logs) for way in tried]
     if len(problems) == 1:
         return problems[0]
     *plain, last = [fit(p, p.nominal(), WHITE, 6) for p in problems]
     closest = min(plain, key=lambda f: f.sse)
-    if tried[-1] == Between.SMOOTH and last.sse > _SMOOTHER * closest.sse:
+    enough = _SMOOTHER if tried[-1] == Between.SMOOTH else _by_chance(segment)
+    if tried[-1] != Between.STRAIGHT and last.sse > enough * closest.sse:
         return closest.problem
     return min(closest, last, key=lambda f: f.sse).problem
+
+
+def _by_chance(segment: Segment) -> float:
+    """Of its mean square what a way of as many numbers leaves at least, where another one is right."""
+    return float(np.exp(-2.0 * NUMBERS.nats / len(segment.y)))
 
 
 def _about_zero(problem: Problem) -> Problem:
@@ -82,8 +89,11 @@ def _about_zero(problem: Problem) -> Problem:
 
 
 def ways(segment: Segment) -> list[Between]:
-    """What a command may do between its samples."""
-    rests = np.mean(np.diff(segment.fed.x) == 0.0) > _RESTS
+    """What an input may do between its samples. What is measured runs in lines, but that it may be held where
+    it only jumps and rests, if that leaves less."""
+    rests = bool(np.mean(np.diff(segment.fed.x) == 0.0) > _RESTS)
+    if segment.entry != "command":
+        return [Between.STRAIGHT, Between.HELD][: 1 + rests]
     return [way for way in _WAYS if not (rests and way == Between.SMOOTH)]
 
 

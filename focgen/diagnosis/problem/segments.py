@@ -17,7 +17,7 @@ from focgen.logs.repeats import dead_band
 from focgen.rig import kernels
 from focgen.rig.effects import Run
 from focgen.rig.rig import UNITY, Rig
-from focgen.rig.session import joined, run_of
+from focgen.rig.session import entering, joined, run_of
 from focgen.rig.stages import ENTERS, LEAVES, STAGES
 
 _TIMING = 0.3  # of a sample: what loggers leave open
@@ -127,7 +127,7 @@ class Segment:
     def bent(self) -> np.ndarray:
         """The input (n,), where it was measured with its bends sharpened: straight lines between samples of
         a smooth signal pass below its crests, by (2πfh)²/12 of them, which the second difference mends."""
-        if self.entry == "command" or self.between == Between.SMOOTH:
+        if self.entry == "command" or self.between != Between.STRAIGHT:
             return self.x
         before, after = _neighbours(self.x, self.run.rest)
         made: np.ndarray = self.x - (before - 2 * self.x + after) / 12.0
@@ -211,7 +211,7 @@ def make(
     """The segment from ``entry`` to ``exit``, with the input as logged or as given; of the ways
     ``input_modes`` in which that may be off, those that the output can show.
     """
-    x, y = joined(logs, entry) if x is None else x, joined(logs, exit)
+    x, y = entering(logs, entry) if x is None else x, joined(logs, exit)
     input_modes = np.zeros((len(x), 0)) if input_modes is None else input_modes
     names = tuple(log.name for log in logs)
     led = [exit == "output" and _is_led(log) for log in logs]

@@ -20,7 +20,7 @@ from focgen.rig.placed import Placed
 from focgen.rig.recalled import recalled, with_recalled
 from focgen.rig.replay import effect_tables, simulate_session
 from focgen.rig.rig import Rig
-from focgen.rig.session import joined, run_of
+from focgen.rig.session import entering, entry_of, run_of
 
 _SHOWN = 1e-3  # of the output's level: less of a zero shows in no reading
 
@@ -54,12 +54,12 @@ def _after(
     """A rig after a session, its effects as a file has them: those that it was given, with what they were
     ``told`` then, ahead of those ``placed``."""
     left: list[dict[str, float]] = []
-    entry = "command" if all("command" in log for log in logs) else "pressure"
+    entry = entry_of(logs)
     first = "regulator" if entry == "command" else "actuator"
     chain = Chain(rig, tuple(placed))
     if chain.placed:
-        x, run = joined(logs, entry), run_of(logs, entry)
-        chain.run(x, first, "sensor", run, between_of(rig, entry), left=left)
+        way = between_of(rig, entry)
+        chain.run(entering(logs, entry), first, "sensor", run_of(logs, entry), way, left=left)
     clock = max(log.start + len(log) * log.sample_time for log in logs)
     besides = [{k: v for k, v in table.items() if k in ("learned", "promise")} for table in rig.effects]
     besides += [dict(told or {})] * len(placed)

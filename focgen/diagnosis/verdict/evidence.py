@@ -17,6 +17,7 @@ from focgen.logs.experiment import Experiment
 from focgen.logs.thinning import thinned
 from focgen.rig.effects import Run
 from focgen.rig.rig import Rig
+from focgen.rig.session import entry_of
 
 MOST = 8000
 """Samples of all experiments together that are kept."""
@@ -37,7 +38,7 @@ class Evidence:
 
 def drawn_of(rig: Rig, evidence: Evidence, logs: Sequence[Experiment]) -> Drawn:
     """What is drawn of a diagnosis, signals thinned to :data:`MOST` samples."""
-    entry, worst = _entry_of(logs), _worst_of(evidence)
+    entry, worst = entry_of(logs), _worst_of(evidence)
     traces = tuple(_trace(evidence, logs, i, entry) for i in range(len(logs)))
     return Drawn(
         entry=entry,
@@ -59,11 +60,6 @@ def drawn_of(rig: Rig, evidence: Evidence, logs: Sequence[Experiment]) -> Drawn:
         ),
         residual=_residual(worst),
     )
-
-
-def _entry_of(logs: Sequence[Experiment]) -> str:
-    """The first signal that every experiment has."""
-    return "command" if all("command" in log for log in logs) else "pressure"
 
 
 def _worst_of(evidence: Evidence) -> Explanation:
