@@ -42,6 +42,7 @@ from focgen.logs.experiment import Experiment
 from focgen.progress import step
 from focgen.rig.recalled import all_ahead
 from focgen.rig.rig import Rig
+from focgen.rig.session import entry_of
 
 _RIVALS = 3  # of what was found that may tell how the logs begin
 _CARRIED = 2  # times that findings are made anew with what they left in later experiments
@@ -64,7 +65,7 @@ def found_in(
     """What is found of a session, begun in whatever way the rig tells best. ``only``, ``bootstrap``: as
     :func:`~focgen.diagnosis.diagnose.diagnose` takes them."""
     explanations = explain_all(nominal, session, NUMBERS.nats, only, bootstrap)
-    nominal = explanations[0].with_intersample(nominal)
+    nominal = explanations[0].with_intersample(nominal, entry_of(session))
     search = _Search(nominal, only, bootstrap)
     explanations, session = _rested(search, explanations, session)
     explanations, session = _slow(search, explanations, session)

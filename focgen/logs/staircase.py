@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.stats import chi2
 
 from focgen.arrays import Array
 from focgen.logs.between import jumps_of, noise_level
 
-_APART = 6.0  # standard deviations of their difference: so far apart two means are two levels
-_LOUDER = 1.2  # times the noise: what is left about the levels is at most so loud
-_SLOPED = 2.0  # mean square of the levels' slopes, in their standard errors: 1 is noise's own
-_SHORT = 5  # samples: a signal whose levels are shorter on average is on its way, not at rest
+_APART = 5.0  # standard deviations of their difference: so far apart two means are two levels
+_LOUDER = 1.5  # times the noise: what is left about the levels is at most so loud
+_CHANCE = 1e-3  # that noise alone gives the levels such slopes
+_SHORT = 8  # samples: a signal whose levels are shorter on average is on its way, not at rest
 _REPEATS = 0.5  # of samples without noise are as the one before
 
 
 def staircase_of(values: Array) -> Array | None:
-    """The levels (n,) of a signal that jumps and rests, each the mean of its readings; None where it does
-    anything else, or nothing.
+    """The levels (n,) of a signal that jumps and rests, or rests throughout, each the mean of its readings;
+    None where it does anything else.
 
     Jumps that stand out are cuts, and so is where the means of what is between differ most (binary
     segmentation; A. J. Scott and M. Knott, Biometrics 30, 1974). A slow ramp may be cut into levels that
@@ -24,12 +25,12 @@ def staircase_of(values: Array) -> Array | None:
     """
     noise = noise_level(values)
     if noise == 0.0:
-        return values if np.mean(np.diff(values) == 0.0) > _REPEATS and np.ptp(values) else None
+        return values if len(values) and np.mean(np.diff(values) == 0.0) > _REPEATS else None
     levels = _levels(np.split(values, np.flatnonzero(jumps_of(values))), noise)
-    if levels is None or len(levels) < 2:
+    if levels is None:
         return None
     found: Array = np.concatenate([np.full(len(level), np.mean(level)) for level in levels])
-    rests = float(np.std(values - found)) <= _LOUDER * noise and _slope(levels, noise) <= _SLOPED
+    rests = float(np.std(values - found)) <= _LOUDER * noise and not _sloped(levels, noise)
     return found if rests else None
 
 
@@ -61,11 +62,11 @@ def _cut(values: Array, noise: float) -> int:
     return best + 1 if apart[best] > _APART * noise else 0
 
 
-def _slope(levels: list[Array], noise: float) -> float:
-    """The mean square of the levels' slopes, in their standard errors."""
-    squares = [0.0]
+def _sloped(levels: list[Array], noise: float) -> bool:
+    """Whether the levels have slopes that noise does not."""
+    squares = []
     for level in levels:
         place = np.arange(len(level)) - 0.5 * (len(level) - 1)
         if len(level) >= _SHORT:
             squares.append(float(place @ level) ** 2 / (noise**2 * float(place @ place)))
-    return float(np.sum(squares)) / max(len(squares) - 1, 1)
+    return bool(chi2.sf(sum(squares), max(len(squares), 1)) < _CHANCE)

@@ -47,8 +47,11 @@ static double seated(double preload, double y, double pushed)
     return (y == 0.0 ? pushed : y) < 0.0 ? -preload : preload;
 }
 
-/* The same with dry friction and a preload, from the place `last` of the sample before; `taken` is what all of them take from x. */
-static double moved(const double *spring, double still, double gain, double x, double last, int *moving, double *taken)
+/* The same with dry friction and a preload, from the place `last` of the sample before; `taken` is what all of them take from x. Where x
+ * was held, still grows `per` as much as `since`, what is left of x at the begin of the sample. Friction and preload jump with x: what
+ * moves has them from there on. */
+static double moved(const double *spring, double still, double gain, double x, double last, double per, double *since, int *moving,
+                    double *taken)
 {
     double slope, drag = 0.0, slide = spring[5], stick = spring[6], preload = spring[7];
     if (stick > 0.0) {
@@ -64,6 +67,11 @@ static double moved(const double *spring, double still, double gain, double x, d
     if (preload > 0.0 && fabs(held) < preload) {
         *taken = x + still / gain;
         return 0.0;
+    }
+    if (per != 0.0) {
+        double start = x - drawn(spring, last, &slope) - drag - held;
+        still += per * (start - *since), *since = start;
+        held = seated(preload, 0.0, x - drag + still / gain);
     }
     double y = solved(spring, still, gain, x - drag - held, last);
     *taken = drawn(spring, y, &slope) + drag + held;
@@ -97,20 +105,21 @@ void focgen_bent_modes(int n, const double *x, double *y, const unsigned char *r
             zr = gr * past, zi = gi * past;
         }
         double enters = entering(x, rest, k, held);
-        if (held && !rest[k]) past += enters - entered; /* it jumped at the sample before, what is taken from it did not */
+        int jumps = held && !rest[k], bears = spring[6] > 0.0 || spring[7] > 0.0;
+        if (jumps && !bears) past += enters - entered; /* it jumped at the sample before, what the spring takes did not */
         entered = enters;
         int down = switching && fabs(enters) < fabs(last);
         const double *A = a + down * m, *B0 = b0 + down * m, *B1 = b1 + down * m, *P = pair + 6 * down;
-        double still = P[0] * zr - P[1] * zi + P[2] * past, gain = through + P[4];
+        double still = P[0] * zr - P[1] * zi + P[2] * past, gain = through + P[4], per = P[2], since = past;
         for (int i = 0; i < m; i++) {
             z[i] = A[i] * z[i] + B0[i] * past;
             still += z[i];
-            gain += B1[i];
+            gain += B1[i], per += B0[i];
         }
-        last = y[k] = moved(spring, still, gain, enters, last, &moving, &taken);
+        last = y[k] = moved(spring, still, gain, enters, last, jumps && bears ? per : 0.0, &since, &moving, &taken);
         double now = enters - taken;
-        for (int i = 0; i < m; i++) z[i] += B1[i] * now;
-        turn(P, past, now, &zr, &zi);
+        for (int i = 0; i < m; i++) z[i] += B0[i] * (since - past) + B1[i] * now;
+        turn(P, since, now, &zr, &zi);
         past = now;
     }
 }
@@ -133,7 +142,7 @@ void focgen_bent_filter(int n, const double *x, double *y, const unsigned char *
             taken = drawn(spring, last, &slope) + x[k] - came(spring, x[k]);
             for (int i = m; i >= 1; i--) w[i - 1] = b[i] * x[k] - c[i] * taken - a[i] * last + (i < m ? w[i] : 0.0);
         }
-        last = y[k] = moved(spring, w[0] + b[0] * x[k], c[0], 0.0, last, &moving, &taken);
+        last = y[k] = moved(spring, w[0] + b[0] * x[k], c[0], 0.0, last, 0.0, &slope, &moving, &taken);
         for (int i = 1; i <= m; i++) w[i - 1] = b[i] * x[k] - c[i] * taken - a[i] * last + (i < m ? w[i] : 0.0);
     }
 }

@@ -21,6 +21,13 @@ def shifted(x: Array, rest: Bytes, whole: int) -> Array:
     return y
 
 
+def centred(x: Array, rest: Bytes) -> Array:
+    """An input (n,) that is held between samples as one in lines, each of its jumps spread over the sample
+    before and the one after."""
+    made: Array = 0.5 * (x + shifted(x, rest, 1))
+    return made
+
+
 def delayed(x: Array, rest: Bytes, h: float, delay: float) -> Array:
     """``x`` (n,), linear between samples of ``h`` s, later by ``delay`` s, each experiment from zero."""
     whole, part = split_delay(delay, h)

@@ -15,7 +15,7 @@ from focgen.rig import plant as plants
 from focgen.rig.begun import from_there, past_of, with_past
 from focgen.rig.changeable import IN_STEPS
 from focgen.rig.courses import sharpened
-from focgen.rig.delay import delayed
+from focgen.rig.delay import centred, delayed
 from focgen.rig.dynamics import FREE, SAME, STEADY, UNCHANGED, Dynamics, Lever, Pace
 from focgen.rig.effects import EQUATIONS, Run
 from focgen.rig.lever import levered
@@ -291,7 +291,7 @@ def _linear(
         return [_plant(plant, dynamics, between, delay)]
     lag = linear.single_lag(actuator.dynamics)
     if not lag and changed <= {"loading", "unloading"}:
-        return [_two_paced(actuator.dynamics, (dynamics.loading, dynamics.unloading), delay)]
+        return [_two_paced(actuator.dynamics, (dynamics.loading, dynamics.unloading), between, delay)]
     if not lag:
         return [_bent(actuator.dynamics, dynamics, between, delay)]
     gain, T, alpha = lag
@@ -361,12 +361,14 @@ def _bent(transfer: TransferFunction, dynamics: Dynamics, between: Between | boo
     )
 
 
-def _two_paced(transfer: TransferFunction, paces: tuple[float, float], delay: float) -> Step:
-    return (
-        (transfer, paces, delay),
-        lambda x, run: lags.run_paces(transfer, x, run.rest, run.h, paces, delay),
-        None,
-    )
+def _two_paced(
+    transfer: TransferFunction, paces: tuple[float, float], between: Between | bool, delay: float
+) -> Step:
+    def act(x: Array, run: Run) -> Array:
+        x = centred(x, run.rest) if between == Between.HELD else x
+        return lags.run_paces(transfer, x, run.rest, run.h, paces, delay)
+
+    return (transfer, paces, between, delay), act, None
 
 
 _OF_PLANTS = IN_STEPS | {"drag", "bend"}

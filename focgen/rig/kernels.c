@@ -77,7 +77,7 @@ static void disturbed(int n, const double *x, double *y, const unsigned char *re
             }
         }
         double now = entering(x, rest, k, held), sum = 0.0, since = past;
-        if (held && !rest[k]) since += now - entered; /* what enters jumped at the sample before, what is taken from it did not */
+        if (held && !rest[k] && stick == 0.0) since += now - entered; /* it jumped at the sample before, an obstacle's force did not */
         entered = now;
         int down = switching && fabs(now) < fabs(last);
         const double *A = a + down * m, *B0 = b0 + down * m, *P = pair + 6 * down;
@@ -90,7 +90,13 @@ static void disturbed(int n, const double *x, double *y, const unsigned char *re
             if (stick > 0.0 && fabs(borne) <= (moving ? slide : stick)) {
                 now -= borne + pushed, moving = 0;
             } else {
-                if (stick > 0.0) now -= borne < 0.0 ? -slide : slide, moving = 1;
+                double way = borne < 0.0 ? -slide : slide;
+                if (stick > 0.0 && held) { /* what slides takes as much from the jump on: friction jumps with the input */
+                    double more = now - pushed - way - since;
+                    for (int i = 0; i < m; i++) z[i] += B0[i] * more, sum += B0[i] * more, still += B0[i] * more;
+                    still += P[2] * more, since += more;
+                }
+                if (stick > 0.0) now -= way, moving = 1;
                 double beyond = (still + gain * now - place) / (1.0 + gain * stiffness);
                 if (stiffness > 0.0 && beyond > 0.0) now -= stiffness * beyond;
             }

@@ -103,7 +103,7 @@ def respond(
 
     With changed ``dynamics`` the response, too, counts as linear between samples: the delay is exact there in
     whole samples only. Friction bears the springs and the springpot from sample to sample: y stays where it
-    was as long as that takes no more than ``stick``.
+    was as long as that takes no more than ``stick``. What it bears jumps with a held input.
     """
     if delay and dynamics == UNCHANGED:
         whole, part = split_delay(delay, h)

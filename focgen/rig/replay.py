@@ -28,7 +28,7 @@ from focgen.rig.plausibility import doubts
 from focgen.rig.recalled import with_earlier
 from focgen.rig.response import check_bounded, longest
 from focgen.rig.rig import Rig
-from focgen.rig.session import entering, entry_of, run_of, staircases
+from focgen.rig.session import entering, entry_of, jumps_and_rests, run_of
 from focgen.rig.stages import LEAVES, STAGES
 from focgen.shown import Shown
 
@@ -142,7 +142,7 @@ def told_between(rig: Rig, logs: Sequence[Experiment]) -> Rig:
         return rig
     usual, likely = between_of(rig, entry), list(Between)
     if entry == "pressure":
-        likely = [Between.STRAIGHT] if staircases(logs, entry) is None else [Between.STRAIGHT, Between.HELD]
+        likely = [Between.STRAIGHT, Between.HELD][: 1 + jumps_and_rests(logs, entry)]
     if len(likely) == 1:
         return rig
     ways = [replace(rig, between=way) for way in sorted(likely, key=lambda way: way != usual)]

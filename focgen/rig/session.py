@@ -33,13 +33,16 @@ def joined(logs: Sequence[Experiment], role: str) -> Array:
 def entering(logs: Sequence[Experiment], role: str) -> Array:
     """The input (n,) of all experiments. One that is measured, and only jumps and rests, is what its readings
     are on average from jump to jump: what they scatter is the gauge's."""
-    steps = staircases(logs, role) if role != "command" else None
-    return joined(logs, role) if steps is None else steps
+    if role == "command":
+        return joined(logs, role)
+    parts = [(np.asarray(log[role], float), _steps(log, role)) for log in logs]
+    return np.concatenate([read if steps is None else steps for read, steps in parts])
 
 
-def staircases(logs: Sequence[Experiment], role: str) -> Array | None:
-    """The levels (n,) that a signal of all experiments has from jump to jump; None where it does anything
-    else in one of them."""
-    steps = [staircase_of(np.asarray(log[role], float)) for log in logs]
-    kept = [x for x in steps if x is not None]
-    return np.concatenate(kept) if len(kept) == len(steps) else None
+def jumps_and_rests(logs: Sequence[Experiment], role: str) -> bool:
+    """Whether a measured signal does nothing else in one of the experiments, and jumps there."""
+    return any(steps is not None and np.ptp(steps) > 0.0 for steps in (_steps(log, role) for log in logs))
+
+
+def _steps(log: Experiment, role: str) -> Array | None:
+    return staircase_of(np.asarray(log[role], float)) if len(log) else None

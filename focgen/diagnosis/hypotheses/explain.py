@@ -90,10 +90,9 @@ class Explanation:
         """The one stage this segment is, None where stages are merged."""
         return self.segment.stages[0] if len(self.segment.stages) == 1 else None
 
-    def with_intersample(self, rig: Rig) -> Rig:
-        """``rig`` with what its first input does between samples, where that is not as usual."""
+    def with_intersample(self, rig: Rig, first: str) -> Rig:
+        """``rig`` with what its ``first`` input does between samples, where that is not as usual."""
         between, entry = self.segment.between, self.segment.entry
-        first = "pressure" if rig.signals.command is None else "command"
         usual = entry != first or between == between_of(rig, first)
         return rig if usual else replace(rig, between=Between(between))
 

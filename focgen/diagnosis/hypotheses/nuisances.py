@@ -91,10 +91,15 @@ def _about_zero(problem: Problem) -> Problem:
 def ways(segment: Segment) -> list[Between]:
     """What an input may do between its samples. What is measured runs in lines, but that it may be held where
     it only jumps and rests, if that leaves less."""
-    rests = bool(np.mean(np.diff(segment.fed.x) == 0.0) > _RESTS)
     if segment.entry != "command":
-        return [Between.STRAIGHT, Between.HELD][: 1 + rests]
+        return [Between.STRAIGHT, Between.HELD][: 1 + any(map(_jumps, segment.fed.parts(segment.fed.x)))]
+    rests = np.mean(np.diff(segment.fed.x) == 0.0) > _RESTS
     return [way for way in _WAYS if not (rests and way == Between.SMOOTH)]
+
+
+def _jumps(x: np.ndarray) -> bool:
+    """Whether an input (n,) rests but for jumps."""
+    return bool(np.mean(np.diff(x) == 0.0) > _RESTS and np.ptp(x) > 0.0)
 
 
 def _zeroed(problem: Problem) -> Problem:

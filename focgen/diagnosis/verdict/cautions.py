@@ -13,6 +13,7 @@ from focgen.diagnosis.hypotheses.level_pace import paced_stage, slower_by
 from focgen.diagnosis.hypotheses.rivals import Cause
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.verdict.confidence import nominal_instead
+from focgen.diagnosis.verdict.moving import begun_moving
 from focgen.diagnosis.verdict.predicted_improvement import paths
 from focgen.diagnosis.verdict.restless import louder
 from focgen.diagnosis.verdict.sizes import at_their_ends
@@ -89,6 +90,17 @@ def the_rest(summary: Summary) -> Iterator[str]:
 
 def _little(share: float) -> str:
     return f"{share:.0%}" if share > 0.0 else "nothing"
+
+
+def underway(causes: Sequence[tuple[Explanation, Cause]]) -> Iterator[str]:
+    """Where a log of what integrates begins while that moves."""
+    for e in {id(e): e for e, _ in causes}.values():
+        if names := begun_moving(e):
+            verb = "begins" if len(names) == 1 else "begin"
+            yield (
+                f"{_within(e)}: {listed(names)} {verb} while the rig moves. How fast is not known, and an "
+                "effect may stand for it: let the log of what integrates begin at rest"
+            )
 
 
 def ended(causes: Sequence[tuple[Explanation, Cause]]) -> Iterator[str]:

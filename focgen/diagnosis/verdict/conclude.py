@@ -25,6 +25,7 @@ from focgen.diagnosis.verdict.cautions import (
     paced,
     rounded,
     the_rest,
+    underway,
     zeros_off,
 )
 from focgen.diagnosis.verdict.confidence import tied
@@ -32,6 +33,7 @@ from focgen.diagnosis.verdict.evidence import Evidence
 from focgen.diagnosis.verdict.improvement import Improvement
 from focgen.diagnosis.verdict.moments import another
 from focgen.diagnosis.verdict.moves import at_the_end, far_moves
+from focgen.diagnosis.verdict.moving import begun_moving
 from focgen.diagnosis.verdict.nominal import likelier_nominal, nominal_alone, unnamed
 from focgen.diagnosis.verdict.sizes import at_their_ends, estimates
 from focgen.diagnosis.verdict.summary import Summary, doubts, sorted_out, sound_parts
@@ -93,6 +95,7 @@ def conclude(
             *cautions(summary.causes, unknown, list(doubted), [*off, *nominal_alone(explanations, off)]),
             *lesser(stands.beside),
             *the_rest(summary),
+            *underway(summary.causes),
             *ended(summary.causes),
             *zeros_off(rig, summary.rigs.refitted, explanations),
             *paced(explanations),
@@ -174,6 +177,7 @@ def _found(
     sure = sure * NUMBERS.unlikely if e.strained else sure  # numbers far off explain the same
     sure = sure * NUMBERS.unlikely if summary.stands_for_more or something_unknown_acts(e) else sure
     sure = sure * NUMBERS.smaller if summary.follows_these_logs else sure
+    sure = sure * NUMBERS.unlikely if begun_moving(e) else sure
     trust = min(trust, NUMBERS.smaller) if at_their_ends(cause.rivals[0]) else trust
     sure = sure * _lasting(e, cause) * min(_beside(e, cause), trust)
     total = summary.total or Improvement(0.0, (0.0, 0.0))
