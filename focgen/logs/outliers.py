@@ -210,7 +210,7 @@ def least_noise(y: Array) -> float:
     if high == low:
         low, high = ends_of_medians(y, 3)
     span = high - low
-    steps = np.abs(np.diff(y))
+    steps = np.abs(np.diff(np.asarray(y, float)))
     finest = float(np.min(steps, where=steps > 1e-9 * span, initial=np.inf))
     return max(0.5 * finest, _FINE * span)
 

@@ -32,9 +32,8 @@ from focgen.rig.session import entering, entry_of, jumps_and_rests, run_of
 from focgen.rig.stages import LEAVES, STAGES
 from focgen.shown import Shown
 
-_CLOSER = (
-    0.05  # of the mean square that a held command leaves: less, and another way is what the command does
-)
+_CLOSER = 0.05  # of the mean square that the usual way of a command leaves: less, and another one is right
+_HELD = 0.5  # the same of a pressure in lines that only jumps and rests: less, and it is held
 _BESIDES = ("name", "form", "stage", "clock", "carried", "promise", "learned")
 
 
@@ -140,15 +139,15 @@ def told_between(rig: Rig, logs: Sequence[Experiment]) -> Rig:
     entry = entry_of(logs)
     if rig.between is not None or not all(entry in log and "output" in log for log in logs):
         return rig
-    usual, likely = between_of(rig, entry), list(Between)
+    usual, likely, closer = between_of(rig, entry), list(Between), _CLOSER
     if entry == "pressure":
-        likely = [Between.STRAIGHT, Between.HELD][: 1 + jumps_and_rests(logs, entry)]
+        likely, closer = [Between.STRAIGHT, Between.HELD][: 1 + jumps_and_rests(logs, entry)], _HELD
     if len(likely) == 1:
         return rig
     ways = [replace(rig, between=way) for way in sorted(likely, key=lambda way: way != usual)]
     left = [_left(way, logs) for way in ways]
     closest = int(np.argmin(left))
-    return ways[closest] if left[closest] < _CLOSER * left[0] else rig
+    return ways[closest] if left[closest] < closer * left[0] else rig
 
 
 def _left(rig: Rig, logs: Sequence[Experiment]) -> float:

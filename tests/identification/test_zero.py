@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from focgen.errors import FitError
 from focgen.fractional.simulation import Convolution
 from focgen.fractional.transfer import TransferFunction
 from focgen.identification.identify import identify
@@ -92,3 +93,21 @@ def test_misfit_is_no_zero():
     log = Experiment("e", H, {"pressure": drive, "output": made + rng.normal(0.0, NOISE, len(made))})
     rig = Rig("bellows", H, Signals("t", "y", pressure="p"), sensor=UNITY)
     assert abs(identify(rig, [log], integer=False).rig.zero) < 3.0 * NOISE
+
+
+HIGH = staircase([2, 1, 3, 1.5, 2.5, 1.2, 2.8, 1.6], 9)
+CLOSE = staircase([2, 2.6, 1.6, 2.5, 1.8, 2.7, 1.7, 2.2], 9)
+
+
+@pytest.mark.parametrize("drive", [HIGH, CLOSE], ids=["far from 0", "little of K(p)"])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_zero_is_no_better_known_than_the_gain(drive, seed):
+    """Logs that never come near 0 tell K(p) p there by its slope alone, and that badly."""
+    found = identify(RIG, [logged("e", drive, 0.0, np.random.default_rng(seed), 9.0)], integer=False)
+    assert found.rig.zero == 0.0
+
+
+def test_counts_are_numbers():
+    read = {"pressure": RESTED[::FINER].astype(int), "output": np.arange(len(RESTED[::FINER])) % 7}
+    with pytest.raises(FitError):
+        identify(RIG, [Experiment("e", H, read)], integer=False)

@@ -99,3 +99,26 @@ def test_a_linear_actuator_of_real_order_is_held_too():
     rig = Rig("coil", H, SIGNALS, LinearActuator(TransferFunction([(2.0, 0.0)], [(0.8, 0.6), (1.0, 0.0)])))
     exact = Convolution(TransferFunction([(2.0, 0.0)], [(0.8, 0.6), (1.0, 0.0)]), H, "zero").run(X)
     assert np.max(np.abs(answer(rig, X, H, Between.HELD) - exact)) < 1e-4 * np.ptp(exact)
+
+
+@pytest.mark.parametrize("alpha", [0.5, 0.7])
+@pytest.mark.parametrize("form, values", [("coulomb", (0.3,)), ("breakaway", (0.3, 0.6))])
+def test_friction_gives_way_to_a_held_input_where_a_finer_grid_does(form, values, alpha):
+    """What stands still bears a jump at once: a body that a line would move over a sample stays, or goes."""
+    rig = Rig("coil", H, SIGNALS, Actuator(0.8, alpha, (1.2, 0.0)))
+    placed, fine = (Placed("friction", form_of("friction", form), "actuator", values),), H / 50
+    for jump in np.arange(0.1, 1.2, 0.1):
+        x = np.repeat([0.0, 2.0, 2.0 - jump], [5, 120, 40])
+        true = answer(replace(rig, sample_time=fine), np.repeat(x, 50), fine, Between.STRAIGHT, placed)[::50]
+        found = answer(rig, x, H, Between.HELD, placed)
+        assert abs((found[-1] - found[124]) - (true[-1] - true[124])) < 0.02
+
+
+def test_two_paces_of_several_terms_count_a_held_input_as_centred():
+    """A pace next to the even one moves the response by next to nothing."""
+    lags = TransferFunction([(1.5, 0.0)], [(0.024, 3.0), (0.35, 2.0), (1.2, 1.0), (1.0, 0.0)])
+    rig = Rig("coil", H, SIGNALS, LinearActuator(lags))
+    placed = (Placed("unloading_asymmetry", form_of("unloading_asymmetry", "speed"), "actuator", (0.9999,)),)
+    even, near = (answer(rig, X, H, Between.HELD, each) for each in ((), placed))
+    lines = answer(rig, X, H, Between.STRAIGHT)
+    assert np.std(near - even) < 0.5 * np.std(lines - even)

@@ -29,7 +29,7 @@ def _moves(y: np.ndarray, made: np.ndarray) -> bool:
     count, noise = _FIRST, white_level(y)
     while count <= _MOST * len(y):
         moved, own = (_moved(part[:count]) for part in (y, made))
-        if abs(moved) > _SURE * noise * np.sqrt(8.0 / count):
+        if abs(moved) > _SURE * noise * np.sqrt(2.0 / (count // 4)):  # of two means of a quarter each
             return bool(own * np.sign(moved) < _MADE * abs(moved))
         count *= 2
     return False
