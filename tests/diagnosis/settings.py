@@ -49,7 +49,7 @@ CONSTANTS = {
     "verdict/compose.py": ["_SHOWN"],
     "verdict/evidence.py": ["_STILL"],
     "verdict/moves.py": ["_SLACK"],
-    "verdict/moving.py": ["_MOST", "_SURE"],
+    "verdict/moving.py": ["_MOST", "_SEEN", "_SURE"],
     "verdict/sizes.py": ["_SLACK"],
     "verdict/outside.py": ["_ASKED", "_BAND"],
     "verdict/restless.py": ["_MOVES", "_RESTS", "_STILL", "_SURE"],

@@ -10,6 +10,7 @@ from focgen.logs.between import white_level
 _FIRST = 8  # samples of the shortest beginning that is looked at,
 _MOST = 0.1  # and part of a log that the longest is
 _SURE = 6.0  # standard errors that a beginning moves by
+_SEEN = 0.003  # of its reach, likewise: less is of no concern
 _MADE = 0.5  # of that: its input makes less of a stand
 
 
@@ -29,7 +30,8 @@ def _moves(y: np.ndarray, made: np.ndarray) -> bool:
     count, noise = _FIRST, white_level(y)
     while count <= _MOST * len(y):
         moved, own = (_moved(part[:count]) for part in (y, made))
-        if abs(moved) > _SURE * noise * np.sqrt(2.0 / (count // 4)):  # of two means of a quarter each
+        surely = _SURE * noise * np.sqrt(2.0 / (count // 4))  # of two means of a quarter each
+        if abs(moved) > max(surely, _SEEN * float(np.ptp(y))):
             return bool(own * np.sign(moved) < _MADE * abs(moved))
         count *= 2
     return False
