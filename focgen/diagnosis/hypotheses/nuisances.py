@@ -27,8 +27,8 @@ from focgen.logs.experiment import Experiment
 from focgen.rig.rig import Rig
 from focgen.rig.session import entry_of
 
-# of the rig's response: what columns may be out of step by; more is a delay. Half a sample is excluded by no
-# log, whose loop may read before it writes, and a whole one is the most
+# of the rig's response: what columns may be out of step by; more is a delay. A whole sample is the most, and
+# half of one where an input jumps, for a loop may read before it writes, the least
 _OUT_OF_STEP, _HALF = 0.05, 0.5
 _GAUGE = 0.01  # of its reading: by what a gauge may be off without being a fault
 _WAYS = (Between.HELD, Between.STRAIGHT, Between.SMOOTH)  # of a command between its samples
@@ -47,7 +47,8 @@ def problem_of(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Proble
     freely = owner(rig) if owner(rig) in segment.stages else None
     load, response = (scales.levels["load"], scales.levels["response"])
     segment = replace(segment, pace=pace(rig, segment.stages, scales.clocks["response"]))
-    slack = float(np.clip(_OUT_OF_STEP * scales.clocks["response"] / segment.fed.run.h, _HALF, 1.0))
+    least = _HALF if any(map(_jumps, segment.fed.parts(segment.fed.x))) else 0.0
+    slack = float(np.clip(_OUT_OF_STEP * scales.clocks["response"] / segment.fed.run.h, least, 1.0))
     return Problem(
         segment, NominalParameters(rig, segment.stages, freely, load, response), scales, slack=slack
     )
