@@ -49,10 +49,13 @@ def cranked(x, share):
 BEHIND = {"hysteresis": relays, "gain_nonlinearity": cranked}
 
 
-def lagged(x, time):
+def lagged(x, time, held=True):
+    """A lag's exact response to what is held between samples, or runs in lines."""
     kept, y = np.exp(-H / time), np.zeros(len(x))
+    mean = (1.0 - kept) * time / H
+    past, now = (1.0 - kept, 0.0) if held else (mean - kept, 1.0 - mean)
     for i in range(1, len(x)):
-        y[i] = kept * y[i - 1] + (1.0 - kept) * x[i - 1]
+        y[i] = kept * y[i - 1] + past * x[i - 1] + now * x[i]
     return y
 
 
@@ -66,7 +69,7 @@ def logs(seed, of, effect, share=0.25):
     for number, drive in enumerate((np.repeat(LEVELS, 300), slow)):
         moved = lagged(2.0 * drive, HEATS)
         moved = BEHIND[effect](moved, share) if of == "actuator" else moved
-        read = lagged(moved, READS)
+        read = lagged(moved, READS, held=False)
         read = BEHIND[effect](read, share) if of == "sensor" else read
         noise = 0.006 * rng.standard_normal((2, len(drive)))
         signals = {"pressure": drive, "curvature": moved + noise[0], "output": read + noise[1]}
