@@ -148,7 +148,8 @@ def filling_by_venting(venting_speed, turbulent_above, level):
 @pytest.mark.long
 def test_pump_vents_slowly_with_its_angle_logged_and_a_rig_from_the_log(tmp_path):
     """From the log alone, by the commands of the README: beside the valve nothing is named but what the
-    actuator has by itself."""
+    actuator has by itself. What else acts in the last run, where the pump becomes another at once, is told,
+    and makes the name no surer than 0.67."""
     log = OPEN / RIGS["pump"][0]
     if not log.exists():
         pytest.skip(f"the open data ({log.name}) are not here")
@@ -159,7 +160,8 @@ def test_pump_vents_slowly_with_its_angle_logged_and_a_rig_from_the_log(tmp_path
     found = diagnose(identified, [log], to=58.0, pictures=False)
     first, *others = found.causes
     assert (first.stage, first.candidates[0].effect) == ("regulator", "valve_asymmetry")
-    assert first.candidates[0].confidence > 0.9
+    assert first.candidates[0].confidence > 0.6
+    assert any("command to pressure: what is left has passed through the rig" in note for note in found.notes)
     assert all((c.stage, c.candidates[0].effect) in BESIDE for c in others)
 
 
