@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -45,4 +46,10 @@ def jumps_and_rests(logs: Sequence[Experiment], role: str) -> bool:
 
 
 def _steps(log: Experiment, role: str) -> Array | None:
-    return staircase_of(np.asarray(log[role], float)) if len(log) else None
+    return _staircase(np.asarray(log[role], float).tobytes()) if len(log) else None
+
+
+@lru_cache(maxsize=32)
+def _staircase(readings: bytes) -> Array | None:
+    """A log is asked for its steps with every rig that it is compared with."""
+    return staircase_of(np.frombuffer(readings))
