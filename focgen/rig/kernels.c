@@ -34,7 +34,7 @@ static void undisturbed(int n, const double *x, double *y, const unsigned char *
     gain_at_rest(m, a, b0, b1, pair, through, &gr, &gi);
     settle(m, a, b0, b1, 1.0, begins);
     for (int i = 0; i < m; i++) {
-        double before = held ? 0.0 : b0[i], now = b1[i] + b0[i] - before;
+        double before = held ? 0.0 : b0[i], now = held ? b0[i] + b1[i] : b1[i];
         keeps[i] = a[i], takes[i] = a[i] * now + before, begins[i] -= now, at_once += now;
     }
     for (int k = 0; k < n; k++) {
