@@ -15,7 +15,10 @@ from focgen.identification.noise import ResidualModel
 from focgen.logs.between import noise_level
 
 _MOVED = 0.1  # of its step: the input has left its rest
-_LITTLE = 0.02  # of the output's spread: a zero below this is no part of a rig
+_LITTLE = 0.02  # of the output's spread: a zero below this is no part of a rig,
+_INFERRED = (
+    0.1  # and one below this no log shows that does not rest: the past that it begins in takes as much
+)
 _NEAR = 0.2  # of the input's reach: from further off than this no log shows what is at 0
 
 
@@ -38,8 +41,8 @@ def shared_zero(excitations: Sequence[Excitation], fit: FractionalFit) -> float:
         scatter = float(np.std(zeros, ddof=1)) / np.sqrt(count)
         apart = max(apart, float(student.ppf(0.975, count - 1)) * scatter)
     half = float(np.hypot(apart, 1.96 * np.sqrt(max(drive @ fit.gain_covariance @ drive, 0.0))))
-    spread = float(np.median([x.spread for x in excitations]))
-    return told_value(mean, half) if abs(mean) > max(half, _LITTLE * spread) else 0.0
+    little = (_INFERRED if np.any(drive) else _LITTLE) * float(np.median([x.spread for x in excitations]))
+    return told_value(mean, half) if abs(mean) > max(half, little) else 0.0
 
 
 def resting(x: Excitation) -> int:

@@ -83,13 +83,14 @@ def test_the_zero_of_a_fitted_curvature_is_the_actuators():
 
 
 HIGH = staircase([2, 1, 3, 1.5, 2.5, 1.2, 2.8, 1.6], 9)
-CLOSE = staircase([2, 2.6, 1.6, 2.5, 1.8, 2.7, 1.7, 2.2], 9)
+WIDE = staircase([2, 1, 3, 0.5, 2.5, 1.5, 3, 0.6], 9)
 
 
-@pytest.mark.parametrize("drive", [HIGH, CLOSE], ids=["far from 0", "little of K(p)"])
+@pytest.mark.parametrize("drive", [HIGH, WIDE], ids=["far from 0", "begun underway"])
 @pytest.mark.parametrize("seed", range(3))
 def test_a_zero_is_no_better_known_than_the_gain(drive, seed):
-    """Logs that never come near 0 tell K(p) p there by its slope alone, and that badly."""
+    """Logs that never come near 0 tell K(p) p there by its slope alone, and that badly. What was before a log
+    that begins on its way is not told to a few per cent."""
     found = identify(RIG, [logged("e", drive, 0.0, np.random.default_rng(seed), 9.0)], integer=False)
     assert found.rig.zero == 0.0
 
