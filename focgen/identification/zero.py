@@ -16,9 +16,7 @@ from focgen.logs.between import noise_level
 
 _MOVED = 0.1  # of its step: the input has left its rest
 _LITTLE = 0.02  # of the output's spread: a zero below this is no part of a rig,
-_INFERRED = (
-    0.1  # and one below this no log shows that does not rest: the past that it begins in takes as much
-)
+_INFERRED = 0.1  # and one below this no log shows that does not rest: a past takes as much
 _NEAR = 0.2  # of the input's reach: from further off than this no log shows what is at 0
 
 
