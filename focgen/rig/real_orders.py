@@ -30,6 +30,10 @@ _BELOW = 12  # spacings that the circle may be smaller for that
 _WITHIN = 0.02  # of a turn: so far about 0 goes the longest response
 _RATES = (0.1, 0.4, 0.7, 1.0)  # of that, of modes that stand for what is within: their error is 0.02⁴/4!
 _AROUND = 80  # places on that circle
+_NEAR = 0.75 * np.exp(2j * math.pi * (np.arange(32) + 0.5) / 32)  # ln s about the first node: half of _APART
+# Of Euler and Maclaurin: a sum from its first term on is short of the integral over its spacing Δ by
+# Σ w_j Δ^j g_j, with g_j the coefficients of the terms' Taylor series about the first
+_END = np.array([-1 / 2, 1 / 12, 0.0, -6 / 720, 0.0, 120 / 30240, 0.0, -5040 / 1209600])
 _SPLIT = 1e-7  # by which a coefficient is moved where poles coincide: it parts them by the root of that
 _CLOSE = 1e-4  # in ln s: closer poles coincide
 _ON_AXIS = 1e-9  # rad from an axis
@@ -46,7 +50,7 @@ def modes_of(transfer: TransferFunction, h: float, duration: float) -> Modes:
     first, quick = _first(zeros, math.log(_WITHIN / duration)), math.log(QUICK / h)
     zeros = zeros[zeros.real > first]
     rates, weights, through = _cut(transfer, first, quick)
-    rates, weights = np.append([rates, weights], _about_zero(transfer, first, weights), axis=1)
+    rates, weights = np.append([rates, weights], _about_zero(transfer, first), axis=1)
     pairs: list[tuple[complex, complex]] = []
     for zero, share in zip(zeros, _shares(zeros, first)):
         both = 2.0 if zero.imag > _ON_AXIS else 1.0
@@ -126,16 +130,15 @@ def _density(transfer: TransferFunction, x: Array) -> Array:
     return made
 
 
-def _about_zero(transfer: TransferFunction, first: float, weights: Array) -> tuple[Array, Array]:
+def _about_zero(transfer: TransferFunction, first: float) -> tuple[Array, Array]:
     """Rates and weights (k,) of what lies within e^``first`` of s = 0, as pole or cut: modes there that have
-    the first moments, (1/2πi) ∮ H s^k ds, of its circle. The rule's end at the first of its ``weights`` (m,)
-    is in them."""
+    the first moments, (1/2πi) ∮ H s^k ds, of its circle, and of what the rule lacks at its end there."""
     radius = math.exp(first)
     turned, counts = _circle()
     values = counts * transfer(radius * turned) * turned
-    power, each = _power(transfer, first), np.arange(len(_RATES))
+    each = np.arange(len(_RATES))
     moments = np.array([0.5 * radius * float(np.real(np.sum(values * turned**k))) for k in each])
-    moments += weights[0] * (-1.0) ** each * _end(_SPACING * (power + each))
+    moments += (-1.0) ** each * _end(transfer, first)
     rates = np.array(_RATES)
     return radius * rates, np.linalg.solve(np.vander(-rates, increasing=True).T, moments)
 
@@ -147,16 +150,27 @@ def _circle() -> tuple[Complex, Array]:
     return np.exp(1j * math.pi * nodes), counts
 
 
-def _power(transfer: TransferFunction, x: float) -> float:
-    """The power of ξ with which its density goes about e^x."""
-    step = 0.01
-    low, high = _density(transfer, np.array([x - step, x + step]))
-    return math.log(high / low) / (2.0 * step) if low * high > 0.0 else 0.0
+def _end(transfer: TransferFunction, first: float) -> Array:
+    """What the sum of the rule's terms is short of at its ``first``, for each power of ξ / e^``first``.
+
+    The density may change its sign there: it goes as a power of ξ only close to 0.
+    """
+    about, scale = first + _NEAR, _SPACING ** np.arange(1, len(_END) + 1)
+    turned = (_at(transfer, about - 1j * math.pi) - _at(transfer, about + 1j * math.pi)) * np.exp(about)
+    made = []
+    for power in range(len(_RATES)):
+        values = turned / (2j * math.pi) * np.exp(power * _NEAR)
+        series = [np.mean(values / _NEAR**j).real for j in range(len(_END))]
+        made.append(float(np.sum(_END * scale * series)))
+    return np.array(made)
 
 
-def _end(pace: Array) -> Array:
-    """What the sum of e^(``pace`` k), k = 0, 1 …, counts its first term too much (Euler and Maclaurin)."""
-    made: Array = -0.5 + pace / 12.0 - pace**3 / 720.0 + pace**5 / 30240.0 - pace**7 / 1209600.0
+def _at(transfer: TransferFunction, x: Complex) -> Complex:
+    """H(e^``x``), beyond the cut too."""
+    num, den = (
+        sum(t.coefficient * np.exp(t.order * x) for t in side) for side in (transfer.num, transfer.den)
+    )
+    made: Complex = num / den
     return made
 
 
