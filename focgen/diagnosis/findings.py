@@ -139,7 +139,7 @@ def _slow(
     if search.only is not None or not ahead:
         return explanations, session
     for e in explanations:
-        if not e.causes and e.predictability.share <= NUMBERS.left:
+        if not e.causes and e.amiss <= NUMBERS.left:
             continue
         if (logs := suits_what_is_slow(search.nominal, e, ahead)) is not None:
             step("what is slow, from log to log")
@@ -179,7 +179,7 @@ def _others(nominal: Rig, e: Explanation, session: Sequence[Experiment]) -> Iter
     leave least by themselves, however far behind."""
     known = {rival.effect: rival.fit for cause in e.causes[:1] for rival in cause.rivals[:_RIVALS]}
     yield from list(known.values())[1:]
-    if e.predictability.share > NUMBERS.left:
+    if e.amiss > NUMBERS.left:
         others = sorted((name for name in e.errors if name not in known), key=lambda name: e.errors[name])
         fits = (alone(nominal, e.segment, session, name) for name in others)
         yield from islice((fit for fit in fits if fit is not None), _RIVALS)
@@ -221,7 +221,7 @@ def _remembers(search: _Search, e: Explanation, lasting: Sequence[Experiment]) -
     """Whether what was found leaves far more than it does with a family beside it that lies where the log
     before left it. Where every loop is taken to begin anew, a drift or a curve stands in its place."""
     wanders = any(candidate.form.wanders for candidate in e.best.problem.candidates)
-    if search.only is not None or not (wanders or e.predictability.share > NUMBERS.left):
+    if search.only is not None or not (wanders or e.amiss > NUMBERS.left):
         return False
     others = families_in(e, lambda f: f.remembers)
     return any(leaves_less_beside(search.nominal, e, lasting, name) for name in others)

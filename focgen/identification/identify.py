@@ -15,6 +15,7 @@ from focgen.errors import FitError, LogError, check_choice
 from focgen.identification.caveats import effects_left_out, warnings_of
 from focgen.identification.digits import told_gain, told_value
 from focgen.identification.excitation import Excitation, is_driven, possible_rests, prepare
+from focgen.identification.form import lack_of_form
 from focgen.identification.fractional import FractionalFit, fit_fractional
 from focgen.identification.gain import check_degree, feasible_degree, r2_of_line
 from focgen.identification.identification import ExperimentFit, Identification, Joint, Unseen
@@ -157,13 +158,14 @@ def _actuator(
     excitations = [x.bare() for x in excitations]  # a long log's spectra are large
     fits, failed = fit_each(excitations, fit.pasts, fit.delay, integer)
     joint, compromise = _joint(excitations, fit, fits), is_compromise(excitations, fit)
+    known = replace(actuator_uncertainty(excitations, fit, compromise), form=lack_of_form(excitations, fit))
     zero, of_sensor = shared_zero(excitations, fit), excitations[0].fitted_role == "output"
     new = replace(
         rig,
         actuator=Actuator(joint.T, joint.alpha, joint.gain, 0.0 if of_sensor else zero),
         zero=zero if of_sensor else rig.zero,
         delays=replace(rig.delays, actuator=joint.delay),
-        uncertainty=replace(rig.uncertainty, actuator=actuator_uncertainty(excitations, fit, compromise)),
+        uncertainty=replace(rig.uncertainty, actuator=known),
     )
     quality, criterion = _compared(excitations, fits, joint)
     shown = _shown(others, new)

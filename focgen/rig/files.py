@@ -236,7 +236,7 @@ def _relative(table: Table | None, usual: Relative) -> Relative:
     """What is given of a stage's uncertainty, the default for the rest."""
     if table is None:
         return usual
-    keys = [key for key, value in vars(usual).items() if value]
+    keys = [key for key, value in vars(usual).items() if value or key == "form"]
     found = Relative(**{key: table.number(key, getattr(usual, key)) for key in keys})
     table.done()
     for key, value in vars(found).items():
@@ -330,7 +330,7 @@ def _column_table(name: str, scale: Scale | None) -> str | dict[str, Any]:
 
 
 def _relative_table(part: Relative, usual: Relative) -> dict[str, Any]:
-    return {key: value for key, value in vars(part).items() if vars(usual)[key]}
+    return {k: v for k, v in vars(part).items() if vars(usual)[k] or (k == "form" and v)}
 
 
 def _actuator_table(actuator: Actuator | LinearActuator) -> dict[str, Any]:

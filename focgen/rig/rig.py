@@ -134,12 +134,14 @@ class Delays:
 @dataclass(frozen=True)
 class Relative:
     """By how much of themselves a stage's ``gain``, its ``time`` (every time constant and the delay) and its
-    ``alpha`` (an actuator's only) are, or may be, off.
+    ``alpha`` (an actuator's only) are, or may be, off. ``form``: by what its equation is off whatever its
+    numbers are, root mean square, as a part of the standard deviation of what leaves it.
     """
 
     gain: float
     time: float
     alpha: float = 0.0
+    form: float = 0.0
 
 
 @dataclass(frozen=True)

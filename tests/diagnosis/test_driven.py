@@ -70,7 +70,7 @@ def test_slips_at_another_time_are_nothing_else(jumps, monkeypatch):
         causes=(None,),
         segment=SimpleNamespace(closed=False, pace=0.0),
         best=SimpleNamespace(problem=SimpleNamespace(candidates=[SimpleNamespace(form=form)])),
-        predictability=SimpleNamespace(share=0.0),
+        amiss=0.0,
     )
     assert unexplained.is_driven(found) != jumps
 

@@ -296,7 +296,7 @@ def _explained(monkeypatch, ratio, share, left=_STEADY, effects=(), closed=False
         segment=SimpleNamespace(pace=0.0, closed=closed, withheld=0.0),
         converter=None,
         whole=None,
-        predictability=SimpleNamespace(share=share),
+        amiss=share,
         nominal=nominal,
         best=best,
         causes=[SimpleNamespace(rivals=[SimpleNamespace(effect=effect)]) for effect in effects],

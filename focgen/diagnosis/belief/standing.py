@@ -24,17 +24,22 @@ def behind(odds: float, best: float) -> float:
     return float(np.copysign(np.sqrt(2.0 * abs(best - odds)), best - odds))
 
 
-def nominal_off(change: float, static: bool) -> float:
+def nominal_off(change: float, static: bool, form: float = 0.0) -> float:
     """Log odds that a nominal chain is off by itself, over an effect that changes the output by ``change``,
-    as a share of the noise's root mean square; ``static``: a curve.
+    as a share of the noise's root mean square; ``static``: a curve. ``form``: by what the rig's file says
+    that the form of its equations is off, likewise.
 
     The chain of a rig was fitted to its logs until what was left could not be seen. So it may be off by part
     of the noise, and many samples show that clearly though nothing is wrong with the rig. That is mostly the
     curve: in other ways it is off by a third as much. The odds are no higher than an effect is rare: of one
     that changes nothing no log tells anything, and the chain is off by so little or it is not.
+
+    A linear equation of another form makes no curve. All else it may look like, where it is off by as much:
+    no log tells which of the two it is, and neither is the likelier.
     """
     alike = NUMBERS.bent if static else NUMBERS.bent / 3.0
-    return min(4.0 * float(np.log(alike) - np.log(max(change, 1e-12))), -float(np.log(NUMBERS.rare)))
+    by_noise, by_form = (4.0 * float(np.log(max(of, 1e-12) / max(change, 1e-12))) for of in (alike, form))
+    return min(max(by_noise, -np.inf if static else min(by_form, 0.0)), -float(np.log(NUMBERS.rare)))
 
 
 def sureness(odds: float) -> float:

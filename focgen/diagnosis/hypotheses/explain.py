@@ -20,7 +20,7 @@ from focgen.diagnosis.hypotheses.foretelling import foretelling
 from focgen.diagnosis.hypotheses.left import remembers, unleft
 from focgen.diagnosis.hypotheses.longer_path import borne_out, may_show_more, times_as_long
 from focgen.diagnosis.hypotheses.nuisances import may_be_more, uncertain
-from focgen.diagnosis.hypotheses.rivals import Beside, Cause, Examined, left_out, reexamined
+from focgen.diagnosis.hypotheses.rivals import Beside, Cause, Examined, lack_of, left_out, reexamined
 from focgen.diagnosis.hypotheses.search import Ranking, evidence, rank
 from focgen.diagnosis.hypotheses.seen_through import with_steps
 from focgen.diagnosis.hypotheses.two import TwoOthers, two_at_once, two_others
@@ -78,6 +78,11 @@ class Explanation:
     def square(self) -> float:
         """The mean square that its effects leave."""
         return float(np.mean(self.best.weighed**2))
+
+    @property
+    def amiss(self) -> float:
+        """The part of what it leaves that inputs predict, beyond what the nominal form is off by."""
+        return max(0.0, self.predictability.share - lack_of(self.best) ** 2)
 
     @property
     def zero(self) -> float:
@@ -194,7 +199,7 @@ def explain(
         if borne_out(other.best, found.best, found.nominal.problem, Weighing(found.ar)):
             problem, found = kept, other
             break
-    if not found.strained or problem.nominals.far or found.predictability.share < NUMBERS.left:
+    if not found.strained or problem.nominals.far or found.amiss < NUMBERS.left:
         return found
     freed, asked = (
         replace(problem, nominals=replace(problem.nominals, far=True), memory={}),

@@ -26,7 +26,7 @@ _MENDED = 3  # rivals that get a second form where the best has one
 class Rival:
     """A family that may be the cause instead: its ``odds``, nats, over there being no such cause,
     ``separation`` from the best in standard deviations, ``gain`` in nats of the noise, ``change`` of the
-    output as a share of the noise's root mean square."""
+    output as a share of the noise's root mean square. ``form``: by what the nominal form is off, likewise."""
 
     effect: str
     stage: str
@@ -35,13 +35,14 @@ class Rival:
     fit: Fit
     odds: float = np.inf
     change: float = np.inf
+    form: float = 0.0
 
     @property
     def off(self) -> float:
         """Log odds that the nominal chain is off by itself instead; none where this is a rounding: steps are
         no part of a chain."""
         family = library()[self.effect]
-        return -np.inf if family.rounds else nominal_off(self.change, family.static)
+        return -np.inf if family.rounds else nominal_off(self.change, family.static, self.form)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,13 +84,13 @@ def reexamined(best: Fit, beside: Beside) -> Examined:
     """Every effect held against its rivals beside the others; where one of them does better, it takes the
     place, and where none is likelier than that nothing more is there, as what came later may make it, all
     leave it. So they do where the nominal chain is as good as sure to be off by itself."""
-    off = None
-    for _ in range(_SWAPS):
+    off, swaps = None, 0
+    while swaps < _SWAPS:
         causes = _causes(best, beside)
         first = [c.rivals[0] for c in causes]
         usurper = min(first, key=lambda r: r.separation, default=None)
         if usurper is not None and usurper.separation < 0:
-            best = usurper.fit
+            best, swaps = usurper.fit, swaps + 1
             continue
         needless = min(first, key=_needed, default=None)
         if needless is None or _needed(needless) >= 0.0 or beside.granted:
@@ -143,6 +144,7 @@ def _cause(name: str, best: Fit, beside: Beside) -> Cause:
             f,
             odds[n],
             change_of(f, without),
+            lack_of(f),
         )
         for n, f in fits.items()
     ]
@@ -186,6 +188,17 @@ def change_of(of: Fit, without: Fit) -> float:
     left, before = (problem_residual(f) for f in as_they_show(of, without))
     change = left - before
     return float(np.sqrt(np.mean(change**2) / max(np.mean(left**2), 1e-300)))
+
+
+def lack_of(of: Fit) -> float:
+    """The root mean square by which the form of the nominal chain may be off, twice what its rig says, for
+    other experiments show more of it; over that of what a fit leaves."""
+    segment, known = of.problem.segment, of.problem.nominals.rig.uncertainty
+    lack = np.hypot.reduce([getattr(known, stage).form for stage in segment.stages])
+    if not lack:
+        return 0.0
+    left = float(np.sqrt(np.mean(problem_residual(of) ** 2)))
+    return 2.0 * float(lack * np.std(segment.recent(segment.y))) / max(left, 1e-300)
 
 
 def _ranking(name: str, without: Fit, beside: Beside) -> Ranking:

@@ -19,7 +19,16 @@ from focgen.diagnosis.fitting.fit import WHITE, Fit, fit
 from focgen.diagnosis.hypotheses.accept import AcceptanceCriteria
 from focgen.diagnosis.hypotheses.converter import Converter, rms
 from focgen.diagnosis.hypotheses.own_steps import left_by_own_steps
-from focgen.diagnosis.hypotheses.rivals import Beside, Cause, Rival, alike, change_of, share_of, without
+from focgen.diagnosis.hypotheses.rivals import (
+    Beside,
+    Cause,
+    Rival,
+    alike,
+    change_of,
+    lack_of,
+    share_of,
+    without,
+)
 from focgen.diagnosis.hypotheses.search import Ranking, evidence, family, is_itself, on_all, rank
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.rig.effects import library
@@ -143,7 +152,7 @@ def _told(
     def rival(name: str, of: Fit) -> Rival:
         stage = plain[name].problem.candidates[-1].stage
         apart, gain = behind(odds[name], odds[first]), evidence(of, base)
-        return Rival(name, stage, apart, gain, of, odds[name] + more, change_of(of, base))
+        return Rival(name, stage, apart, gain, of, odds[name] + more, change_of(of, base), lack_of(of))
 
     rivals = tuple(sorted((rival(n, f) for n, f in tried.items()), key=lambda r: r.separation))
     if holds(rivals[0].off):

@@ -44,7 +44,8 @@ def seen_at_the_output(
 
 def _changed(cause: Cause, times: float) -> Cause:
     """A cause whose rivals all change so many times as much, if that is more."""
-    rivals = tuple(replace(r, change=max(times, 1.0) * r.change) for r in cause.rivals)
+    more = max(times, 1.0)
+    rivals = tuple(replace(r, change=more * r.change, form=more * r.form) for r in cause.rivals)
     return replace(cause, rivals=rivals)
 
 

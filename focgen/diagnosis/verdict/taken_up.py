@@ -46,7 +46,7 @@ class TakenUp(Instead):
 def taken_up(e: Explanation) -> TakenUp | None:
     """How likely the output takes up a signal at once, instead of an effect found or of none, though inputs
     predict much; None where they do not, where errors add up, or where a rounding was found."""
-    if e.segment.pace or not (e.best.problem.families or e.predictability.share > NUMBERS.left):
+    if e.segment.pace or not (e.best.problem.families or e.amiss > NUMBERS.left):
         return None
     return likeliest(e, _judged)
 

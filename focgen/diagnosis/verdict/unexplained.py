@@ -8,6 +8,7 @@ from focgen.diagnosis.belief.unknown import is_none
 from focgen.diagnosis.hypotheses.converter import is_rounded, rms
 from focgen.diagnosis.hypotheses.disturbance import Disturbance, disturbance
 from focgen.diagnosis.hypotheses.explain import Explanation
+from focgen.diagnosis.hypotheses.rivals import lack_of
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.verdict.clocks import are_apart
 from focgen.diagnosis.verdict.late import is_late
@@ -26,7 +27,13 @@ def is_unknown(e: Explanation) -> bool:
     logged late, columns go by clocks of their own or a pace is uneven instead; unless a coarse converter
     or a logger's dead band explains it, or the nominal chain that is off by itself does."""
     if e.whole is not None and not e.causes:
-        return is_unknown(e.whole)
+        return _is_unknown(e.whole, instead=e.amiss >= NUMBERS.left or not lack_of(e.best))
+    return _is_unknown(e)
+
+
+def _is_unknown(e: Explanation, instead: bool = True) -> bool:
+    """The same of ``e`` with its causes; ``instead``: whether what none of the library is may be there in
+    their place, and not the form of the nominal chain."""
     if e.converter is not None and e.converter.explains(e.best):
         return False
     if not e.causes and rms(e.best.weighed) < e.segment.withheld:
@@ -35,7 +42,8 @@ def is_unknown(e: Explanation) -> bool:
     if _is_disturbed(e, left) or (e.segment.closed and _hidden(e, left)):
         return True
     if (
-        e.causes
+        instead
+        and e.causes
         and not is_rounded(e.causes)
         and (
             from_outside(e)
@@ -48,12 +56,12 @@ def is_unknown(e: Explanation) -> bool:
         )
     ):
         return True
-    if e.predictability.share < NUMBERS.left:
+    if e.amiss < NUMBERS.left:
         return False
     if e.segment.closed and left.bursts and _rings(e):
         return True
     before, after = _squares(e)
-    return is_none(after * e.predictability.share, before - after)
+    return is_none(after * e.amiss, before - after)
 
 
 def disturbed(e: Explanation) -> Disturbance:
@@ -76,7 +84,7 @@ def is_driven(e: Explanation) -> bool:
         return False
     if any(candidate.form.jumps for candidate in e.best.problem.candidates):
         return False
-    return e.predictability.share < NUMBERS.left and disturbed(e).pushed
+    return e.amiss < NUMBERS.left and disturbed(e).pushed
 
 
 def is_noise(e: Explanation) -> bool:
@@ -86,7 +94,7 @@ def is_noise(e: Explanation) -> bool:
         return False
     left = disturbed(e)
     quiet = not (left.bursts or left.low_frequency or left.tonal or left.pushed or is_restless(e))
-    return not is_unknown(e) or (quiet and e.predictability.share <= NUMBERS.much)
+    return not is_unknown(e) or (quiet and e.amiss <= NUMBERS.much)
 
 
 def _added_up(e: Explanation) -> bool:
