@@ -17,6 +17,7 @@ from focgen.fractional.transfer import TransferFunction
 from focgen.identification.kernel import Kernels
 from focgen.logs.between import Course, course_of, jumps_of, noise_level
 from focgen.logs.experiment import Experiment
+from focgen.logs.feedback import unlogged_reference
 from focgen.rig.rig import UNITY, Rig
 
 _AT_REST = 0.02  # of the input's largest value: closer to 0 than this it starts at rest at 0
@@ -41,8 +42,9 @@ class Excitation:
     value ahead of the first sample; ``level`` the value it is stepped to. ``course`` holds pressure^m −
     before^m, m = 1, 2, …, through the sensor where its output is fitted; ``sensor`` is 1 where the curvature
     is. ``rest_shown``: whether the log begins before the first step, so that it shows the output's zero.
-    ``reference`` (n,) where a loop was closed. ``late``: the nominal dead time of the stages that it is seen
-    through, s. ``begins_up``: whether the input was held away from 0 ahead of the first sample.
+    ``reference`` (n,) where a loop was closed, logged or not. ``late``: the nominal dead time of the stages
+    that it is seen through, s. ``begins_up``: whether the input was held away from 0 ahead of the first
+    sample.
     """
 
     name: str
@@ -218,9 +220,10 @@ def possible_rests(experiment: Experiment) -> tuple[float | None, ...]:
 
 
 def _varying_reference(experiment: Experiment) -> Array | None:
-    if "reference" not in experiment or np.ptp(experiment["reference"]) == 0.0:
-        return None
-    return experiment["reference"]
+    """What a closed loop was asked for, whether it was logged or shows in the command alone."""
+    if "reference" in experiment and np.ptp(experiment["reference"]) > 0.0:
+        return experiment["reference"]
+    return unlogged_reference(experiment)
 
 
 def _check(experiment: Experiment) -> None:

@@ -190,7 +190,8 @@ def _recalled(
     roles = [role for role in ENTERS if role in log and all(role in other for other in earlier)]
     begins: dict[str, Begin] = {}
     for ahead, role in zip((None, *roles), roles):
-        told = begin_after(log, earlier, role, past) if _is_known(log, earlier, role) else None
+        known = _is_known(chain.rig, log, earlier, role)
+        told = begin_after(log, earlier, role, past) if known else None
         if earlier and not (told and told.known) and ahead and _drives(chain, ahead, begins):
             told = _driven(chain, log, earlier, ahead, begins[ahead], role, past)
         elif earlier and told is None and own is not None:
@@ -258,15 +259,15 @@ def _gap(log: Experiment, before: Experiment, behind: Experiment, past: float) -
     return np.arange(first, log.start - behind.start + 0.5 * h, -h)
 
 
-def _is_known(log: Experiment, earlier: Sequence[Experiment], role: str) -> bool:
+def _is_known(rig: Rig, log: Experiment, earlier: Sequence[Experiment], role: str) -> bool:
     """Whether what an input was until the experiment begins is known. That is 0 where it is so at first, or
-    what it moves still is, as where a log begins with its first step; or its first samples tell of a step
-    then, from next to nothing. Where the log goes on from another, that one tells."""
+    what it moves lies still where it does at rest, as where a log begins with its first step; or its first
+    samples tell of a step then, from next to nothing. Where the log goes on from another, that one tells."""
     if goes_on(log, earlier):
         return True
     inputs = [r for r in ENTERS if r in log and all(r in other for other in earlier)]
     moved = [*inputs[inputs.index(role) :], *([] if log.begins else ["output"])]
-    if any(_starts_at_zero(log, earlier, r) for r in moved if r in log):
+    if any(_starts_at_rest(rig, log, earlier, r) for r in moved if r in log):
         return True
     begin, least = log.before(role), _NOTHING * _largest(log, earlier, role)
     return bool(begin.ago) and begin.ago[-1] <= log.sample_time and abs(begin.levels[-2]) <= least
@@ -283,12 +284,19 @@ def goes_on(log: Experiment, earlier: Sequence[Experiment]) -> bool:
     return jump <= _NOTHING * _largest(log, earlier, "output")
 
 
-def _starts_at_zero(log: Experiment, earlier: Sequence[Experiment], role: str) -> bool:
-    return abs(float(log[role][0])) <= _NOTHING * _largest(log, earlier, role)
+def _starts_at_rest(rig: Rig, log: Experiment, earlier: Sequence[Experiment], role: str) -> bool:
+    at = _lying(rig).get(role, 0.0)
+    return abs(float(log[role][0]) - at) <= _NOTHING * _largest(log, earlier, role, at)
 
 
-def _largest(log: Experiment, earlier: Sequence[Experiment], role: str) -> float:
-    return max(float(np.max(np.abs(each[role]))) for each in (log, *earlier))
+def _lying(rig: Rig) -> dict[str, float]:
+    """Where signals of a rig at rest lie, by role, that are not 0 there."""
+    offset = rig.actuator.offset if rig.actuator is not None and not rig.integrator else 0.0
+    return {"curvature": offset, "output": rig.zero + (rig.sensor.dc_gain * offset if offset else 0.0)}
+
+
+def _largest(log: Experiment, earlier: Sequence[Experiment], role: str, at: float = 0.0) -> float:
+    return max(float(np.max(np.abs(each[role] - at))) for each in (log, *earlier))
 
 
 def begin_after(

@@ -1,7 +1,9 @@
 """Diagnoses from closed-loop logs: the output's noise is in the command, and predicts nothing.
 
-Red when noise in the command is taken for what the rig does.
+Red when noise in the command is taken for what the rig does, with a reference in the logs or without.
 """
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,6 +23,25 @@ def named(diagnosis):
 def test_noise_that_goes_round_the_loop_is_no_gap(seed, roles):
     found = diagnose(RIG, closed_session(seed, noise=0.015, roles=roles))
     assert found.verdict in ("none", "parameters") and not found.causes
+
+
+def unled(logs):
+    """The logs without what the loop was asked for."""
+    kept = [{r: v for r, v in log.signals.items() if r != "reference"} for log in logs]
+    return [replace(log, signals=signals) for log, signals in zip(logs, kept)]
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_nor_is_it_where_no_reference_was_logged(seed):
+    """It was unknown: the command foretold more than half of what was left, for it holds the noise."""
+    found = diagnose(RIG, unled(closed_session(seed, noise=0.015)), pictures=False)
+    assert found.verdict in ("none", "parameters") and not found.causes
+
+
+def test_an_effect_is_named_through_a_loop_of_no_logged_reference():
+    logs = unled(closed_session(1, lock=2.5))
+    assert make(logs, "command", "output").closed
+    assert named(diagnose(RIG, logs, pictures=False)) == [["gain_nonlinearity"]]
 
 
 @pytest.mark.long

@@ -54,7 +54,7 @@ def begun_session(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...
 def _told(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
     """The experiments with the begins that their own first samples tell."""
     found = begun(rig, logs)
-    if not any(log.begins or log.stands for log in found):
+    if not _away(found) and not _away(found := begun(_refitted(rig, logs)[0], logs)):
         return found
     at_rest = tuple(replace(log, begins={}, stands=0.0) for log in logs)
     for _ in range(_AGAIN):
@@ -63,10 +63,15 @@ def _told(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
     return found if better else tuple(logs)
 
 
+def _away(logs: Sequence[Experiment]) -> bool:
+    """Whether some begin away from rest."""
+    return any(log.begins or log.stands for log in logs)
+
+
 def begun_with(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
     """The experiments with their begins told anew by the rig with the effects ``placed`` in it; a session at
     rest as it is."""
-    return begun(rig, logs, placed) if any(log.begins or log.stands for log in logs) else tuple(logs)
+    return begun(rig, logs, placed) if _away(logs) else tuple(logs)
 
 
 def rested_long(logs: Sequence[Experiment]) -> tuple[Experiment, ...]:

@@ -13,6 +13,7 @@ from focgen.arrays import Ints
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.logs.between import Between, white_level
 from focgen.logs.experiment import Experiment
+from focgen.logs.feedback import unlogged_reference
 from focgen.logs.repeats import dead_band
 from focgen.rig import kernels
 from focgen.rig.effects import Run
@@ -32,7 +33,7 @@ class Segment:
     other as in ``run``. ``between``: what the input does from one sample to the next. ``names`` of the
     experiments. ``trust`` (n,), 0 … 1: what a sample counts, less where a sample time a little off makes a
     difference beyond the noise. ``asked`` (n,), of order one: what was asked of the rig, which its noise has
-    no part in: the reference in a closed loop, else the input; ``led``: whether it is a reference;
+    no part in: the reference in a closed loop, logged or not, else the input; ``led``: whether it was;
     ``closed``: whether a loop was closed around the rig; ``wanted`` (n,): its reference where it was, else
     the input, empty where none was. ``input_modes`` (n, k): ways in which an input that was simulated may be
     off, a standard deviation each. ``loose`` (n, k): what the output would be off by, were experiments to
@@ -215,7 +216,9 @@ def make(
     input_modes = np.zeros((len(x), 0)) if input_modes is None else input_modes
     names = tuple(log.name for log in logs)
     led = [exit == "output" and _is_led(log) for log in logs]
+    hidden = [_hidden(log) if entry == "command" and exit == "output" else None for log in logs]
     closed = [_is_closed(log) for log in logs]
+    looped = any(closed) or any(made is not None for made in hidden)
     trust = np.concatenate([_trust(np.asarray(log[exit], float), _unsteadiness(log)) for log in logs])
     whole = Segment(
         entry,
@@ -227,12 +230,12 @@ def make(
         Between.HELD if entry == "command" else Between.STRAIGHT,
         names,
         trust,
-        _asked(logs, x, led),
+        _asked(logs, x, led, hidden),
         any(led),
-        any(closed),
+        looped,
         input_modes[:, _felt(input_modes, x, y)],
         np.zeros((len(x), 0)),
-        wanted=_asked(logs, x, closed) if any(closed) else np.zeros(0),
+        wanted=_asked(logs, x, closed, hidden) if looped else np.zeros(0),
         band=dead_band(y),
         passed=_passed(logs, entry),
     )
@@ -262,10 +265,16 @@ def _felt(input_modes: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return made
 
 
-def _asked(logs: Sequence[Experiment], x: np.ndarray, led: Sequence[bool]) -> np.ndarray:
-    """The reference of those that are ``led``, the input of the others: in a closed loop that carries the
-    output's noise, and would predict it."""
+def _asked(
+    logs: Sequence[Experiment],
+    x: np.ndarray,
+    led: Sequence[bool],
+    hidden: Sequence[np.ndarray | None],
+) -> np.ndarray:
+    """The reference of those that are ``led``, what is ``hidden`` where none was logged, the input of the
+    others: in a closed loop that carries the output's noise, and would predict it."""
     ends = np.cumsum([len(log) for log in logs])[:-1]
+    x = np.concatenate([i if h is None else h for i, h in zip(np.split(x, ends), hidden)])
     inputs = np.split(x / (float(np.max(np.abs(x))) or 1.0), ends)
     top = max(
         (float(np.max(np.abs(log["reference"]))) for log, is_led in zip(logs, led) if is_led), default=1
@@ -273,6 +282,12 @@ def _asked(logs: Sequence[Experiment], x: np.ndarray, led: Sequence[bool]) -> np
     return np.concatenate(
         [log["reference"] / top if is_led else i for log, i, is_led in zip(logs, inputs, led)]
     )
+
+
+def _hidden(log: Experiment) -> np.ndarray | None:
+    """What was asked of the rig in a loop whose reference nobody logged, or never moved; None where there is
+    no such loop."""
+    return None if _is_led(log) else unlogged_reference(log)
 
 
 def _is_led(log: Experiment) -> bool:

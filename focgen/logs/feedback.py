@@ -1,0 +1,88 @@
+"""A loop that was closed though no reference was logged: the command shows the output's noise.
+
+What is white of a reading is in no input that was made ahead of it. So where a command falls in the very
+sample in which a reading is too high by its noise, or in the next one, a controller made it of that reading.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from focgen.arrays import Array, Bools
+from focgen.logs.experiment import Experiment
+
+_PAST = 6  # samples of both that the next one is foretold by
+_FITTED = 3  # rounds, each without what was far from foretold
+_FAR = 3.0  # deviations: what is farther is a step, and no noise
+_LATER = (0, 1)  # samples from a reading to the command that is made of it
+_FALLS = -0.5  # correlation of what is new in both
+_FEWEST = 100  # samples
+_MOVES = 1e-6  # of its span: a command that is new by less is a program
+
+
+def unlogged_reference(log: Experiment) -> Array | None:
+    """What was asked of a rig whose controller made its command (n,) of its output, where no reference tells:
+    the command without its part of the present reading, in its unit. None where no such loop shows.
+
+    Of u = K (r − y) + what adds up, it is K r + what adds up. So the output's noise has no part in it.
+    """
+    if "command" not in log or "output" not in log or len(log) < _FEWEST:
+        return None
+    u, y = (np.asarray(log[role], float) for role in ("command", "output"))
+    if not (np.all(np.isfinite(u)) and np.all(np.isfinite(y)) and np.ptp(u) > 0.0):
+        return None
+    free = _moving(u)
+    found = [(gain, later) for later in _LATER if (gain := _gain(u, y, free, later)) > 0.0]
+    if not found:
+        return None
+    gain, later = found[0]
+    asked = u + gain * np.r_[np.full(later, y[0]), y[: len(y) - later]]
+    places = np.arange(len(u))
+    made: Array = np.interp(places, places[free], asked[free])
+    return made
+
+
+def _moving(u: Array) -> Bools:
+    """Where a command (n,) is not held at one of its ends, as by a limit: there it shows no noise."""
+    still = np.diff(u, prepend=u[0] - 1.0) == 0.0
+    made: Bools = ~(still & ((u == u.max()) | (u == u.min())))
+    return made
+
+
+def _gain(u: Array, y: Array, free: Bools, later: int) -> float:
+    """By how much a command falls where the reading so many samples sooner is one higher by its noise; 0
+    where that does not show."""
+    u, y, free = u[later:], y[: len(y) - later], free[later:]
+    seen = np.convolve(free, np.ones(_PAST + 1), "valid") > _PAST
+    if np.count_nonzero(seen) < _FEWEST:
+        return 0.0
+    new, read = (v[seen] for v in (_new(u, y, seen), _new(y, u, seen)))
+    if not _typical(new) > _MOVES * np.ptp(u) or not _typical(read) > 0.0:
+        return 0.0
+    if not np.corrcoef(_usual(new), _usual(read))[0, 1] < _FALLS:
+        return 0.0
+    usual = (np.abs(new) < _FAR * _typical(new)) & (np.abs(read) < _FAR * _typical(read))
+    return -float(new[usual] @ read[usual]) / float(read[usual] @ read[usual])
+
+
+def _new(values: Array, other: Array, seen: Bools) -> Array:
+    """What the samples before, and those of the ``other`` signal, do not foretell of each (n − 6,); fitted
+    where they are ``seen``."""
+    count = len(values) - _PAST
+    before = [v[_PAST - k - 1 :][:count] for v in (values, other) for k in range(_PAST)]
+    rows, target, kept = np.stack([np.ones(count), *before], axis=1), values[_PAST:], seen
+    for _ in range(_FITTED):
+        left: Array = target - rows @ np.linalg.lstsq(rows[kept], target[kept], rcond=None)[0]
+        kept = seen & (np.abs(left) <= _FAR * _typical(left[seen]))
+    return left
+
+
+def _usual(values: Array) -> Array:
+    far = _FAR * _typical(values)
+    made: Array = np.clip(values, -far, far)
+    return made
+
+
+def _typical(values: Array) -> float:
+    """A deviation of the usual samples."""
+    return 1.4826 * float(np.median(np.abs(values)))
