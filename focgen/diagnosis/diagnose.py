@@ -19,6 +19,7 @@ from focgen.diagnosis.hypotheses.initial import (
 from focgen.diagnosis.model import Diagnosis
 from focgen.diagnosis.problem.decimate import decimated
 from focgen.diagnosis.proposals.next_experiment import NEXT, propose
+from focgen.diagnosis.verdict.compose import gap
 from focgen.diagnosis.verdict.conclude import conclude
 from focgen.diagnosis.verdict.evidence import drawn_of
 from focgen.diagnosis.verdict.in_between import with_signals
@@ -75,7 +76,8 @@ def diagnose(
     logged, found = session, found_in(nominal, session, only, bootstrap)
     found = unhidden(found, session, bootstrap) if only is None else found
     nominal, explanations, rigs, session = found.nominal, found.explanations, found.rigs, found.session
-    session = begun_as_found(explanations[0].best, rigs.fitted, rigs.placed, session)
+    told = begun_as_found(explanations[0].best, rigs.fitted, rigs.placed, session)
+    session = min(told, session, key=lambda logs: gap(rigs.fitted, rigs.placed, logs))
     session = in_windows(rigs.fitted, session, rigs.placed)
     if only is None:
         explanations, rigs = where_it_is_seen(nominal, explanations, rigs, session)

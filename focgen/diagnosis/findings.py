@@ -23,6 +23,7 @@ from focgen.diagnosis.hypotheses.explain import (
     remembering,
 )
 from focgen.diagnosis.hypotheses.initial import (
+    begun_as_fitted,
     begun_with,
     held_as_fitted,
     loosened,
@@ -71,8 +72,27 @@ def found_in(
     explanations, session = _slow(search, explanations, session)
     explanations, session = _told_by_another(search, explanations, session)
     explanations, session = _lasting(search, explanations, session)
+    session = _as_fitted(nominal, explanations, session)
     rigs = compose.compose(nominal, explanations, held_as_fitted(explanations[0].best, session))
     return Findings(nominal, *_carried_on(search, explanations, rigs, session))
+
+
+def _as_fitted(
+    nominal: Rig, explanations: Sequence[Explanation], session: tuple[Experiment, ...]
+) -> tuple[Experiment, ...]:
+    """The session with its begins as the fits have them, where the whole chain comes closer so: a few levels,
+    told by first samples, are the simplest past and no more."""
+    fitted = session
+    for e in explanations:
+        fitted = begun_as_fitted(e.best, fitted)
+    if all(a is b for a, b in zip(fitted, session)):
+        return session
+
+    def left(logs: tuple[Experiment, ...]) -> float:
+        rigs = compose.compose(nominal, explanations, logs)
+        return compose.gap(rigs.fitted, rigs.placed, logs)
+
+    return fitted if left(fitted) < left(session) else session
 
 
 def unhidden(found: Findings, session: tuple[Experiment, ...], bootstrap: int) -> Findings:

@@ -53,7 +53,7 @@ def read_logs(
     overlap.
 
     ``paths`` are files, or logs in memory: a pandas or polars frame, a dictionary of arrays (m,), or a list
-    of these. Experiments that were read before are only cut.
+    of these. Experiments that were read before are only cut, and put in order where their clocks overlap.
 
     ``sample_time`` (s) is the rig's: what is not uniformly sampled is resampled to it. ``first`` and ``last``
     cut each experiment (s since its first sample). ``limits`` are each role's (low, high) in its unit, which
@@ -63,7 +63,7 @@ def read_logs(
     logs = each_of(paths)
     read = [log for log in logs if isinstance(log, Experiment)]
     if logs and len(read) == len(logs):
-        return tuple(log.between(first, last) for log in read)
+        return in_session_order(tuple(log.between(first, last) for log in read))
     tables = tables_of(logs)
     if not tables:
         raise LogError("logs", "none is given", "name at least one log")

@@ -8,8 +8,9 @@ that.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -19,25 +20,32 @@ from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.problem.held import may_have_held, tells_what_is_held
 from focgen.diagnosis.problem.segments import Segment, cuts, make
 from focgen.logs.begin import REST, Begin
+from focgen.logs.between import white_level
 from focgen.logs.experiment import Experiment
-from focgen.rig.carried import raised
+from focgen.rig.carried import FIRST, raised
 from focgen.rig.effects import Run
 from focgen.rig.engine import Chain
+from focgen.rig.initial import NOTE as ESTIMATED
 from focgen.rig.initial import begun
 from focgen.rig.placed import Placed
 from focgen.rig.recalled import NOTE, begin_after, ended, memory, with_earlier
+from focgen.rig.response import integrations
 from focgen.rig.rig import Rig
 
 _AGAIN = 2  # times that the rig is refitted and the begins told anew
 _ROUNDS = 6  # of a refit
-_LEVEL = 0.3  # of the input's level: a standard deviation of what it was in a window before
+_LEVEL = 0.3  # of the input's level: a standard deviation of what it was in a window before, and in all
+_LITTLE = 0.1  # of it: likewise, where earlier logs tell what it was
 _LONGER = 2.0  # times as long ago each further window ends,
 _SHOWN = 0.08  # of how long the rig remembers: what is longer ago is one window
 _SURE = 0.1  # of what earlier logs left: by what it may be off where they are all that was
 _REST = 0.3  # of a rest of unknown length: by what it may be longer, a standard deviation
 _HELD = 0.1  # of the most that a pump holds: by so much more it held, to see what that does
+_APART = 5.0  # standard errors that first samples are off from rest by, where that is not noise
+_QUIET = 2e-4  # of its span: a reading has so much noise at least
+_RESOLVED = 1e-3  # of the largest singular value: what is smaller tells no levels apart
 _EXACT = 1e-12  # of the output's level squared: less is no noise, but rounding
-_SEEN = 1e-3  # of the output's largest magnitude, in root mean square: less does not show
+_SEEN = 2e-4  # of the output's largest magnitude, in root mean square: less does not show
 
 
 def begun_session(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
@@ -114,13 +122,30 @@ def _refitted(rig: Rig, logs: Sequence[Experiment]) -> tuple[Rig, float]:
 
 
 def loosened(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Segment:
-    """The segment with the ways in which the begins of its experiments may be off."""
-    if not segment.run.begins:
-        return segment
+    """The segment with the ways in which the begins of its experiments may be off. One that is taken to
+    begin at rest may not have, where its first samples are off from that by more than their noise.
+
+    The rig forgets by its own times: as given first, then by those that the session asks for beside these
+    ways.
+    """
+    found = _loosened(rig, segment, logs)
+    for _ in range(_AGAIN if found.loose.shape[1] else 0):
+        problem = problem_of(rig, found, logs)
+        fitted = fit(problem, problem.nominal(), WHITE, _ROUNDS)
+        found = _loosened(problem.rig(fitted.vector), segment, logs)
+    return found
+
+
+def _loosened(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Segment:
     columns, fed = [], segment.fed
     past = memory(rig, logs)
-    for number, ((first, last), begin) in enumerate(zip(fed.run.spans, fed.run.begins)):
-        for way in () if begin.at_rest else _ways(rig, fed, logs[: number + 1], past):
+    begins = fed.run.begins or (REST,) * len(fed.run.spans)
+    for number, ((first, last), begin) in enumerate(zip(fed.run.spans, begins)):
+        if begin.at_rest:
+            ways = _away_from_rest(rig, fed, number, past)
+        else:
+            ways = _ways(rig, fed, logs[: number + 1], past)
+        for way in ways:
             column = np.zeros(len(fed.x))
             column[first:last] = way
             columns.append(column)
@@ -138,10 +163,10 @@ def _ways(rig: Rig, segment: Segment, logs: Sequence[Experiment], past: float) -
         run = Run.of([last - first], [start], h, [begin], stands=[stands])
         return Chain(rig).run(segment.x[first:last], segment.stages[0], stage, run, segment.between)
 
-    begin, changed = segment.run.begins[len(earlier)], []
-    if not begin.known:
-        base, step = made(begin), _LEVEL * segment.level_in
-        changed += [made(other) - base for other in _beside(begin, step, h, _SHOWN * past)]
+    begin, changed = segment.run.begins[len(earlier)], list[np.ndarray]()
+    if not begin.known or _is_astray(rig, segment, len(earlier), begin):
+        step = (_LITTLE if begin.known else _LEVEL) * segment.level_in
+        changed += _changes(made, begin, step, h, _SHOWN * past)
     if earlier and log.paused:
         now, *longer = (made(b) for b in _rested(log, earlier, segment.entry, past))
         changed += [(now - made(REST)) * (_SURE if begin.known else 1.0), *(left - now for left in longer)]
@@ -151,9 +176,94 @@ def _ways(rig: Rig, segment: Segment, logs: Sequence[Experiment], past: float) -
         stood = segment.run.stands[len(earlier)] if segment.run.stands else 0.0
         more = stood + _HELD * float(np.max(np.abs(made(begin, stood, "regulator"))))
         changed = _beside_the_volume(changed, made(begin, more) - made(begin, stood))
-    _, sizes, axes = np.linalg.svd(np.stack(changed), full_matrices=False)
-    found: np.ndarray = (sizes[:, None] * axes)[sizes > _SEEN * segment.level_out * np.sqrt(last - first)]
+    return _uncorrelated(np.stack(changed), segment)
+
+
+def _away_from_rest(rig: Rig, segment: Segment, number: int, past: float) -> np.ndarray:
+    """Rows (k, n), likewise: what an input in windows before an experiment would change of it, where its
+    first samples are off from rest. By how much says little: a zero may hide a part of it."""
+    first, last = segment.run.spans[number]
+    if not _is_astray(rig, segment, number, REST):
+        return np.zeros((0, last - first))
+    step, made = _LEVEL * segment.level_in, partial(_made, rig, segment, number)
+    return _uncorrelated(np.stack(_changes(made, REST, step, segment.run.h, _SHOWN * past)), segment)
+
+
+def _is_astray(rig: Rig, segment: Segment, number: int, begin: Begin) -> bool:
+    """Whether the first samples of an experiment are off from what the begin makes of them by more than
+    their noise: so early nothing else has moved it yet."""
+    first, last = segment.run.spans[number]
+    y = segment.y[first:last]
+    if len(y) < 2 * FIRST or integrations(rig) or rig.integrator:
+        return False
+    off = abs(float(np.mean((y - _made(rig, segment, number, begin))[:FIRST])))
+    noise = max(white_level(y), _QUIET * float(np.ptp(y)))
+    return bool(off > _APART * noise / np.sqrt(FIRST))
+
+
+def _changes(
+    made: Callable[[Begin], np.ndarray], begin: Begin, step: float, h: float, shown: float
+) -> list[np.ndarray]:
+    """What an experiment (n,) is another by with its signal higher in each window before it, and in all."""
+    base = made(begin)
+    rows = [made(other) - base for other in _beside(begin, step, h, shown)]
+    return [*rows, np.sum(rows, axis=0)]
+
+
+def _made(rig: Rig, segment: Segment, number: int, begin: Begin, placed: Sequence[Placed] = ()) -> np.ndarray:
+    """What an experiment (n,) of a segment would be, had it begun so."""
+    first, last = segment.run.spans[number]
+    run = Run.of([last - first], [float(segment.run.clock[first])], segment.run.h, [begin])
+    stages = segment.stages[0], segment.stages[-1]
+    return Chain(rig, tuple(placed)).run(segment.x[first:last], *stages, run, segment.between)
+
+
+def _uncorrelated(changed: np.ndarray, segment: Segment) -> np.ndarray:
+    """Rows (k, n) that are uncorrelated, but for those that do not show."""
+    _, sizes, axes = np.linalg.svd(changed, full_matrices=False)
+    least = _SEEN * segment.level_out * np.sqrt(changed.shape[1])
+    found: np.ndarray = (sizes[:, None] * axes)[sizes > least]
     return found
+
+
+def begun_as_fitted(of: Fit, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
+    """The experiments, each with what entered a segment before it as its fit has it: in windows that make of
+    it what the ways in which its begin may be off do."""
+    by, segment = of.problem.begun(of.vector), of.problem.segment.fed
+    if not len(by) or not by.any() or segment.paced or of.problem.segment.whole is not None:
+        return tuple(logs)
+    rig, placed = of.problem.rig(of.vector), of.problem.placed(of.vector)
+    off, past = segment.loose @ by, memory(rig, logs)
+    begins = segment.run.begins or (REST,) * len(segment.run.spans)
+    found = []
+    for number, (log, begin, (first, last)) in enumerate(zip(logs, begins, segment.run.spans)):
+        if not begin.known and np.any(off[first:last]):
+            begin = _suited(rig, placed, segment, number, begin, off[first:last], past)
+            notes = (n for n in log.notes if n not in (NOTE, ESTIMATED))
+            log = replace(log, begins={**log.begins, segment.entry: begin}, notes=(*notes, ESTIMATED))
+        found.append(log)
+    return tuple(found)
+
+
+def _suited(
+    rig: Rig,
+    placed: Sequence[Placed],
+    segment: Segment,
+    number: int,
+    begin: Begin,
+    off: np.ndarray,
+    past: float,
+) -> Begin:
+    """The begin with other levels in windows, by which an experiment is so much ``off`` (n,) from what it
+    makes of it as it is."""
+    step, h = _LEVEL * segment.level_in, segment.run.h
+    base = _made(rig, segment, number, begin, placed)
+    windows = list(_windows(h, _SHOWN * past))
+    rows = [_made(rig, segment, number, raised(begin, step, *w), placed) - base for w in windows]
+    by = np.linalg.lstsq(np.stack(rows, axis=1), off, rcond=_RESOLVED)[0]
+    for window, share in zip(windows, by):
+        begin = raised(begin, step * float(share), *window)
+    return begin
 
 
 def _beside_the_volume(changed: Sequence[np.ndarray], shift: np.ndarray) -> list[np.ndarray]:
@@ -174,8 +284,14 @@ def _beside(begin: Begin, step: float, h: float, shown: float) -> Iterator[Begin
     """The begin with its signal a ``step`` higher in each of several windows before the log, the longer the
     longer they are ago, up to ``shown`` s, and ahead of that: a few levels are the simplest past that suits
     the data, not what was."""
+    for early, late in _windows(h, shown):
+        yield raised(begin, step, early, late)
+
+
+def _windows(h: float, shown: float) -> Iterator[tuple[float, float]]:
+    """From how long ago to how long ago, s, each of the windows lasts."""
     late, early = 0.0, h
     while late < shown:
-        yield raised(begin, step, early, late)
+        yield early, late
         late, early = early, _LONGER * early
-    yield raised(begin, step, np.inf, late)
+    yield np.inf, late

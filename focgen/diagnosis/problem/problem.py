@@ -25,6 +25,7 @@ Made = TypeVar("Made")
 ZERO = 0.03  # of the level: what a zero is off by that nothing shows alone
 _ALIGNED = 0.5  # of the slack of columns: what a standard deviation is; a delay is to be called one
 _OFF = 3.0  # standard deviations that an input may be off in each way
+_BEGUN = 10.0  # the same of begins, whose ways are of many windows
 _FAR_OFF = 20.0  # the same of a zero that no effect moves
 _QUICKEST = 4.0  # means of samples in a response at least
 _STANDS = 0.1  # of the level: what a volume is off by that is told through an actuator
@@ -194,7 +195,7 @@ class Problem:
         """Lower and upper bounds."""
         ends = self.nominals.bounds()
         zeros = [*[self._drift] * self.zeros, *[_OFF] * self.stood]
-        nuisance = [0.0 if self._shifted else self.slack, *self.gauges, *[_OFF] * self.ways, *zeros]
+        nuisance = [0.0 if self._shifted else self.slack, *self.gauges, *self._ways_within, *zeros]
         low: list[float] = [*ends[0], *(-b for b in nuisance)]
         high: list[float] = [*ends[1], *nuisance]
         for candidate in self.candidates:
@@ -206,6 +207,13 @@ class Problem:
             place = len(self.nominal_start) + 1
             low[place], high[place] = self.zero_within
         return np.array(low, float), np.array(high, float)
+
+    @property
+    def _ways_within(self) -> list[float]:
+        """How far input and begins may be off in each way. Windows before a log that are off together are
+        off in one way, by more than each of them."""
+        modes, loose = self.segment.input_modes.shape[1], self.segment.loose.shape[1]
+        return [*[_OFF] * modes, *[_BEGUN] * loose]
 
     @property
     def _drift(self) -> float:
