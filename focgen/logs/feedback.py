@@ -29,7 +29,7 @@ def unlogged_reference(log: Experiment) -> Array | None:
     if "command" not in log or "output" not in log or len(log) < _FEWEST:
         return None
     u, y = (np.asarray(log[role], float) for role in ("command", "output"))
-    if not (np.all(np.isfinite(u)) and np.all(np.isfinite(y)) and np.ptp(u) > 0.0):
+    if not (np.all(np.isfinite(u)) and np.all(np.isfinite(y)) and min(np.ptp(u), np.ptp(y)) > 0.0):
         return None
     free = _moving(u)
     found = [(gain, later) for later in _LATER if (gain := _gain(u, y, free, later)) > 0.0]

@@ -406,11 +406,11 @@ def test_what_the_nominal_chain_is_off_by_is_not_unknown(monkeypatch, explained)
     monkeypatch.setattr(unexplained, "disturbed", judged.append)
     monkeypatch.setattr(unexplained, "_is_disturbed", lambda e, left: e is whole and not explained)
     whole.converter, whole.segment = None, SimpleNamespace(closed=False, withheld=0.0)
-    whole.predictability = SimpleNamespace(share=0.0)
+    whole.amiss = 0.0
     doubts = ("from_outside", "another", "is_late", "are_apart", "is_uneven", "is_taken_up", "is_unsteady")
     for asked in doubts:
         monkeypatch.setattr(unexplained, asked, lambda e: False)
     monkeypatch.setattr(unexplained, "is_rounded", lambda causes: False)
-    bare = SimpleNamespace(causes=(), whole=whole)
+    bare = SimpleNamespace(causes=(), whole=whole, amiss=1.0)
     assert unexplained.is_unknown(bare) == (not explained)
     assert judged == [whole]

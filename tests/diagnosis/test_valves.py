@@ -139,8 +139,8 @@ def test_a_loop_is_closed_whose_reference_never_moves():
     no_reference = replace(no_reference, signals={r: held[r] for r in ("command", "output")})
     elsewhere = replace(held, signals={**held.signals, "reference": np.full(200, 90.0)})
     assert make([held], "command", "output").closed
-    assert not make([no_reference], "command", "output").closed
-    assert not make([elsewhere], "command", "output").closed
+    for other in (no_reference, elsewhere):  # their commands answer the noise of what is read
+        assert make([other], "command", "output").closed
     np.testing.assert_array_equal(np.ptp(make([held], "command", "output").wanted), 0.0)
 
 

@@ -38,7 +38,9 @@ def nominal_off(change: float, static: bool, form: float = 0.0) -> float:
     no log tells which of the two it is, and neither is the likelier.
     """
     alike = NUMBERS.bent if static else NUMBERS.bent / 3.0
-    by_noise, by_form = (4.0 * float(np.log(max(of, 1e-12) / max(change, 1e-12))) for of in (alike, form))
+    by_noise, by_form = (
+        4.0 * float(np.log(max(of, 1e-12)) - np.log(max(change, 1e-12))) for of in (alike, form)
+    )
     return min(max(by_noise, -np.inf if static else min(by_form, 0.0)), -float(np.log(NUMBERS.rare)))
 
 

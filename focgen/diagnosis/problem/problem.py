@@ -193,9 +193,10 @@ class Problem:
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper bounds."""
-        ends = self.nominals.bounds()
+        ends, (modes, loose) = self.nominals.bounds(), (self.segment.input_modes, self.segment.loose)
+        ways = [_OFF] * modes.shape[1] + [_BEGUN] * loose.shape[1]
         zeros = [*[self._drift] * self.zeros, *[_OFF] * self.stood]
-        nuisance = [0.0 if self._shifted else self.slack, *self.gauges, *self._ways_within, *zeros]
+        nuisance = [0.0 if self._shifted else self.slack, *self.gauges, *ways, *zeros]
         low: list[float] = [*ends[0], *(-b for b in nuisance)]
         high: list[float] = [*ends[1], *nuisance]
         for candidate in self.candidates:
@@ -207,13 +208,6 @@ class Problem:
             place = len(self.nominal_start) + 1
             low[place], high[place] = self.zero_within
         return np.array(low, float), np.array(high, float)
-
-    @property
-    def _ways_within(self) -> list[float]:
-        """How far input and begins may be off in each way. Windows before a log that are off together are
-        off in one way, by more than each of them."""
-        modes, loose = self.segment.input_modes.shape[1], self.segment.loose.shape[1]
-        return [*[_OFF] * modes, *[_BEGUN] * loose]
 
     @property
     def _drift(self) -> float:

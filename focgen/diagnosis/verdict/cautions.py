@@ -174,7 +174,7 @@ def _nominal(causes: Sequence[tuple[Explanation, Cause]]) -> Iterator[str]:
         first = cause.rivals[0]
         if (instead := nominal_instead(first)) > 1.0 - NUMBERS.held:
             lacked = "its form lacked about as much when it was identified ([uncertainty] form); "
-            why = f"{lacked if first.form > NUMBERS.bent / 3.0 else ''}to tell, identify the rig from "
+            why = f"{lacked if first.form > 0.0 else ''}to tell, identify the rig from "
             yield (
                 f"{_within(e)}: the nominal rig may be off by itself ({instead:.0%}) by what the "
                 f"{first.effect} changes, {first.change:.2g} of the noise; {why}logs of it as it should be"
