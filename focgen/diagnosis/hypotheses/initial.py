@@ -8,9 +8,8 @@ that.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -34,7 +33,7 @@ from focgen.rig.rig import Rig
 
 _AGAIN = 2  # times that the rig is refitted and the begins told anew
 _ROUNDS = 6  # of a refit
-_LEVEL = 0.3  # of the input's level: a standard deviation of what it was in a window before, and in all
+_LEVEL = 0.3  # of the input's level: a standard deviation of what it was in a window before
 _LITTLE = 0.1  # of it: likewise, where earlier logs tell what it was
 _LONGER = 2.0  # times as long ago each further window ends,
 _SHOWN = 0.08  # of how long the rig remembers: what is longer ago is one window
@@ -166,7 +165,8 @@ def _ways(rig: Rig, segment: Segment, logs: Sequence[Experiment], past: float) -
     begin, changed = segment.run.begins[len(earlier)], list[np.ndarray]()
     if not begin.known or _is_astray(rig, segment, len(earlier), begin):
         step = (_LITTLE if begin.known else _LEVEL) * segment.level_in
-        changed += _changes(made, begin, step, h, _SHOWN * past)
+        base = made(begin)
+        changed += [made(other) - base for other in _beside(begin, step, h, _SHOWN * past)]
     if earlier and log.paused:
         now, *longer = (made(b) for b in _rested(log, earlier, segment.entry, past))
         changed += [(now - made(REST)) * (_SURE if begin.known else 1.0), *(left - now for left in longer)]
@@ -185,8 +185,9 @@ def _away_from_rest(rig: Rig, segment: Segment, number: int, past: float) -> np.
     first, last = segment.run.spans[number]
     if not _is_astray(rig, segment, number, REST):
         return np.zeros((0, last - first))
-    step, made = _LEVEL * segment.level_in, partial(_made, rig, segment, number)
-    return _uncorrelated(np.stack(_changes(made, REST, step, segment.run.h, _SHOWN * past)), segment)
+    step, base = _LEVEL * segment.level_in, _made(rig, segment, number, REST)
+    others = _beside(REST, step, segment.run.h, _SHOWN * past)
+    return _uncorrelated(np.stack([_made(rig, segment, number, b) - base for b in others]), segment)
 
 
 def _is_astray(rig: Rig, segment: Segment, number: int, begin: Begin) -> bool:
@@ -199,15 +200,6 @@ def _is_astray(rig: Rig, segment: Segment, number: int, begin: Begin) -> bool:
     off = abs(float(np.mean((y - _made(rig, segment, number, begin))[:FIRST])))
     noise = max(white_level(y), _QUIET * float(np.ptp(y)))
     return bool(off > _APART * noise / np.sqrt(FIRST))
-
-
-def _changes(
-    made: Callable[[Begin], np.ndarray], begin: Begin, step: float, h: float, shown: float
-) -> list[np.ndarray]:
-    """What an experiment (n,) is another by with its signal higher in each window before it, and in all."""
-    base = made(begin)
-    rows = [made(other) - base for other in _beside(begin, step, h, shown)]
-    return [*rows, np.sum(rows, axis=0)]
 
 
 def _made(rig: Rig, segment: Segment, number: int, begin: Begin, placed: Sequence[Placed] = ()) -> np.ndarray:
