@@ -77,7 +77,9 @@ def diagnose(
     found = unhidden(found, session, bootstrap) if only is None else found
     nominal, explanations, rigs, session = found.nominal, found.explanations, found.rigs, found.session
     told = begun_as_found(explanations[0].best, rigs.fitted, rigs.placed, session)
-    session = min(told, session, key=lambda logs: gap(rigs.fitted, rigs.placed, logs))
+    if not explanations[0].best.problem.stood:  # of a pump the fit says what it held
+        told = min(told, session, key=lambda logs: gap(rigs.fitted, rigs.placed, logs))
+    session = told
     session = in_windows(rigs.fitted, session, rigs.placed)
     if only is None:
         explanations, rigs = where_it_is_seen(nominal, explanations, rigs, session)

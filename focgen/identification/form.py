@@ -23,10 +23,13 @@ _DIGITS = 2
 
 def lack_of_form(experiments: Sequence[Excitation], fit: FractionalFit) -> float:
     """The root mean square that lags of its drive foretell of what ``fit`` leaves, as a part of the fitted
-    signal's standard deviation; 0 where that does not show.
+    signal's standard deviation; 0 where that does not show, and of closed loops, whose drive has what is left
+    in it.
 
     No numbers of K(p)/(T s^α + 1) take that away, and a rig that is as it was keeps it.
     """
+    if fit.closed_loop:
+        return 0.0
     measured = np.concatenate([x.measured for x in experiments])
     left = np.concatenate(
         [_levelled(x.measured - y) for x, y in zip(experiments, fit.simulated, strict=True)]

@@ -2,6 +2,8 @@
 
 What is white of a reading is in no input that was made ahead of it. So where a command falls in the very
 sample in which a reading is too high by its noise, or in the next one, a controller made it of that reading.
+A rig that answers within the sample does the like in the open, but there a reading moves with the command as
+it does later on, and a controller moves the command against that. One that reads later yet is not found.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ _PAST = 6  # samples of both that the next one is foretold by
 _FITTED = 3  # rounds, each without what was far from foretold
 _FAR = 3.0  # deviations: what is farther is a step, and no noise
 _LATER = (0, 1)  # samples from a reading to the command that is made of it
-_FALLS = -0.5  # correlation of what is new in both
+_TOGETHER = 0.5  # correlation of what is new in both, at least
 _FEWEST = 100  # samples
 _MOVES = 1e-6  # of its span: a command that is new by less is a program
 
@@ -32,7 +34,7 @@ def unlogged_reference(log: Experiment) -> Array | None:
     if not (np.all(np.isfinite(u)) and np.all(np.isfinite(y)) and min(np.ptp(u), np.ptp(y)) > 0.0):
         return None
     free = _moving(u)
-    found = [(gain, later) for later in _LATER if (gain := _gain(u, y, free, later)) > 0.0]
+    found = [(gain, later) for later in _LATER if (gain := _gain(u, y, free, later))]
     if not found:
         return None
     gain, later = found[0]
@@ -50,8 +52,8 @@ def _moving(u: Array) -> Bools:
 
 
 def _gain(u: Array, y: Array, free: Bools, later: int) -> float:
-    """By how much a command falls where the reading so many samples sooner is one higher by its noise; 0
-    where that does not show."""
+    """By how much a command falls where the reading so many samples sooner is one higher by its noise, less
+    than 0 on a rig of negative gain; 0 where that does not show."""
     u, y, free = u[later:], y[: len(y) - later], free[later:]
     seen = np.convolve(free, np.ones(_PAST + 1), "valid") > _PAST
     if np.count_nonzero(seen) < _FEWEST:
@@ -59,7 +61,8 @@ def _gain(u: Array, y: Array, free: Bools, later: int) -> float:
     new, read = (v[seen] for v in (_new(u, y, seen), _new(y, u, seen)))
     if not _typical(new) > _MOVES * np.ptp(u) or not _typical(read) > 0.0:
         return 0.0
-    if not np.corrcoef(_usual(new), _usual(read))[0, 1] < _FALLS:
+    together = float(np.corrcoef(_usual(new), _usual(read))[0, 1])
+    if not together * np.sign(_answer(y, u, seen)) < -_TOGETHER:
         return 0.0
     usual = (np.abs(new) < _FAR * _typical(new)) & (np.abs(read) < _FAR * _typical(read))
     return -float(new[usual] @ read[usual]) / float(read[usual] @ read[usual])
@@ -68,13 +71,25 @@ def _gain(u: Array, y: Array, free: Bools, later: int) -> float:
 def _new(values: Array, other: Array, seen: Bools) -> Array:
     """What the samples before, and those of the ``other`` signal, do not foretell of each (n − 6,); fitted
     where they are ``seen``."""
+    return _foretold(values, other, seen)[1]
+
+
+def _answer(values: Array, other: Array, seen: Bools) -> float:
+    """What a signal makes of the samples before of the ``other`` one, in all."""
+    return float(np.sum(_foretold(values, other, seen)[0][_PAST + 1 :]))
+
+
+def _foretold(values: Array, other: Array, seen: Bools) -> tuple[Array, Array]:
+    """How much of a constant and of the samples before, its own and the other's, there is in each (13,), and
+    what is new in it (n − 6,)."""
     count = len(values) - _PAST
     before = [v[_PAST - k - 1 :][:count] for v in (values, other) for k in range(_PAST)]
     rows, target, kept = np.stack([np.ones(count), *before], axis=1), values[_PAST:], seen
     for _ in range(_FITTED):
-        left: Array = target - rows @ np.linalg.lstsq(rows[kept], target[kept], rcond=None)[0]
+        shares: Array = np.linalg.lstsq(rows[kept], target[kept], rcond=None)[0]
+        left: Array = target - rows @ shares
         kept = seen & (np.abs(left) <= _FAR * _typical(left[seen]))
-    return left
+    return shares, left
 
 
 def _usual(values: Array) -> Array:

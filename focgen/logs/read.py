@@ -63,7 +63,8 @@ def read_logs(
     logs = each_of(paths)
     read = [log for log in logs if isinstance(log, Experiment)]
     if logs and len(read) == len(logs):
-        return in_session_order(tuple(log.between(first, last) for log in read))
+        cut = tuple(log.between(first, last) for log in read)
+        return in_session_order(cut) if _overlap(cut) else cut
     tables = tables_of(logs)
     if not tables:
         raise LogError("logs", "none is given", "name at least one log")
@@ -253,6 +254,12 @@ def digest_of(log: Experiment) -> bytes:
         found.update(role.encode())
         found.update(np.ascontiguousarray(log[role], float).data)  # no copy: a column may be 80 MB
     return found.digest()
+
+
+def _overlap(experiments: Sequence[Experiment]) -> bool:
+    """Whether some begin before others have ended."""
+    by_time = sorted((e for e in experiments if len(e)), key=lambda e: e.start)
+    return any(a.start + a.time[-1] >= b.start for a, b in pairwise(by_time))
 
 
 def in_session_order(experiments: Sequence[Experiment]) -> tuple[Experiment, ...]:

@@ -6,6 +6,8 @@ it was is sure of an effect, or when what was there as it was identified has no 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -60,6 +62,21 @@ def test_a_right_form_lacks_nothing(seed):
     assert identify(RIG, session(ONE, seed)[0], integer=False).rig.uncertainty.actuator.form == 0.0
 
 
+def test_a_closed_loop_tells_nothing_of_the_form():
+    """Its command has the noise in it, which lags of it foretell."""
+    rng, y, u, total = np.random.default_rng(3), np.zeros(1200), np.zeros(1200), 0.0
+    asked, x = np.repeat(rng.uniform(0.0, 3.0, 8), 150), 0.0
+    noise = lfilter([0.02], [1.0, -0.9], rng.normal(size=1200))
+    for k in range(1200):
+        y[k] = x + noise[k]
+        total += 0.05 * (asked[k] - y[k])
+        u[k] = 2.0 * (asked[k] - y[k]) + total
+        x += (1.0 - np.exp(-H / 0.5)) * (2.0 * u[k] - x)
+    rig = replace(RIG, signals=Signals("t", "y", command="u"))
+    found = identify(rig, Experiment("e", H, {"command": u, "output": y}), integer=False)
+    assert found.joint.closed_loop and found.rig.uncertainty.actuator.form == 0.0
+
+
 def test_it_is_in_the_rig_s_file(tmp_path):
     rig = identify(RIG, session(TWO, 5)[0], integer=False).rig
     write_rig(rig, tmp_path / "rig.toml")
@@ -73,7 +90,7 @@ def test_a_rig_as_it_was_has_no_effect_that_is_sure(seed):
     rig = identify(RIG, session(TWO, seed)[0], integer=False).rig
     found = diagnose(rig, session(TWO, seed + 10)[0], pictures=False)
     assert all(cause.candidates[0].confidence <= 0.5 for cause in found.causes)
-    assert any("[uncertainty] form" in note for note in found.notes)
+    assert any("its form lacks about as much" in note for note in found.notes)
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -75,6 +75,22 @@ def test_a_command_made_in_the_open_is_no_controller_s(kind, rings):
         assert unlogged_reference(Experiment("e", 0.1, {"command": u, "output": y})) is None
 
 
+def test_a_rig_of_negative_gain_that_answers_within_the_sample_is_no_loop():
+    pole = np.exp(-0.25)
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        u = lfilter([1.0], [1.0, -0.9], rng.normal(size=N))
+        y = -1.5 * lfilter([1.0 - pole], [1.0, -pole], u)
+        y = y + rng.normal(0.0, 0.01 * np.std(y), N)
+        assert unlogged_reference(Experiment("e", 0.1, {"command": u, "output": y})) is None
+
+
+def test_a_controller_of_a_rig_of_negative_gain_is_found():
+    log, _ = loop(7, 1.0)
+    turned = Experiment("e", 0.1, dict(log.signals, command=-log["command"]))
+    np.testing.assert_allclose(unlogged_reference(turned), -unlogged_reference(log), atol=1e-9)
+
+
 @pytest.mark.parametrize("lacking", ["command", "output"])
 def test_what_lacks_a_signal_shows_no_loop(lacking):
     log, _ = loop(1, 1.0)

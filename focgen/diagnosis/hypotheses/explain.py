@@ -82,7 +82,7 @@ class Explanation:
     @property
     def amiss(self) -> float:
         """The part of what it leaves that inputs predict, beyond what the nominal form is off by."""
-        return max(0.0, self.predictability.share - lack_of(self.best) ** 2)
+        return max(0.0, self.predictability.share - min(1.0, lack_of(self.best)) ** 2)
 
     @property
     def zero(self) -> float:

@@ -41,6 +41,7 @@ _SURE = 0.1  # of what earlier logs left: by what it may be off where they are a
 _REST = 0.3  # of a rest of unknown length: by what it may be longer, a standard deviation
 _HELD = 0.1  # of the most that a pump holds: by so much more it held, to see what that does
 _APART = 5.0  # standard errors that first samples are off from rest by, where that is not noise
+_SEVERAL = 3  # experiments whose median is a zero
 _QUIET = 2e-4  # of its span: a reading has so much noise at least
 _RESOLVED = 1e-3  # of the largest singular value: what is smaller tells no levels apart
 _EXACT = 1e-12  # of the output's level squared: less is no noise, but rounding
@@ -139,11 +140,12 @@ def _loosened(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Segment
     columns, fed = [], segment.fed
     past = memory(rig, logs)
     begins = fed.run.begins or (REST,) * len(fed.run.spans)
+    astray = _astray(rig, fed, begins)
     for number, ((first, last), begin) in enumerate(zip(fed.run.spans, begins)):
         if begin.at_rest:
-            ways = _away_from_rest(rig, fed, number, past)
+            ways = _away_from_rest(rig, fed, number, past) if astray[number] else ()
         else:
-            ways = _ways(rig, fed, logs[: number + 1], past)
+            ways = _ways(rig, fed, logs[: number + 1], past, astray[number])
         for way in ways:
             column = np.zeros(len(fed.x))
             column[first:last] = way
@@ -151,9 +153,9 @@ def _loosened(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Segment
     return segment.anew(loose=np.stack(columns, axis=1)) if columns else segment
 
 
-def _ways(rig: Rig, segment: Segment, logs: Sequence[Experiment], past: float) -> np.ndarray:
+def _ways(rig: Rig, segment: Segment, logs: Sequence[Experiment], past: float, astray: bool) -> np.ndarray:
     """Rows (k, n): what begins a little different would change of the last of the ``logs`` so far,
-    uncorrelated; ``past``: s that the rig remembers."""
+    uncorrelated; ``past``: s that the rig remembers; ``astray``: whether it begins elsewhere than as told."""
     *earlier, log = logs
     first, last = segment.run.spans[len(earlier)]
     start, h = float(segment.run.clock[first]), segment.run.h
@@ -163,7 +165,7 @@ def _ways(rig: Rig, segment: Segment, logs: Sequence[Experiment], past: float) -
         return Chain(rig).run(segment.x[first:last], segment.stages[0], stage, run, segment.between)
 
     begin, changed = segment.run.begins[len(earlier)], list[np.ndarray]()
-    if not begin.known or _is_astray(rig, segment, len(earlier), begin):
+    if not begin.known or astray:
         step = (_LITTLE if begin.known else _LEVEL) * segment.level_in
         base = made(begin)
         changed += [made(other) - base for other in _beside(begin, step, h, _SHOWN * past)]
@@ -180,26 +182,42 @@ def _ways(rig: Rig, segment: Segment, logs: Sequence[Experiment], past: float) -
 
 
 def _away_from_rest(rig: Rig, segment: Segment, number: int, past: float) -> np.ndarray:
-    """Rows (k, n), likewise: what an input in windows before an experiment would change of it, where its
-    first samples are off from rest. By how much says little: a zero may hide a part of it."""
-    first, last = segment.run.spans[number]
-    if not _is_astray(rig, segment, number, REST):
-        return np.zeros((0, last - first))
+    """Rows (k, n), likewise: what an input in windows before an experiment would change of it. By how much
+    its first samples are off from rest says little: a zero may hide a part of it."""
     step, base = _LEVEL * segment.level_in, _made(rig, segment, number, REST)
     others = _beside(REST, step, segment.run.h, _SHOWN * past)
     return _uncorrelated(np.stack([_made(rig, segment, number, b) - base for b in others]), segment)
 
 
-def _is_astray(rig: Rig, segment: Segment, number: int, begin: Begin) -> bool:
-    """Whether the first samples of an experiment are off from what the begin makes of them by more than
-    their noise: so early nothing else has moved it yet."""
-    first, last = segment.run.spans[number]
-    y = segment.y[first:last]
-    if len(y) < 2 * FIRST or integrations(rig) or rig.integrator:
-        return False
-    off = abs(float(np.mean((y - _made(rig, segment, number, begin))[:FIRST])))
-    noise = max(white_level(y), _QUIET * float(np.ptp(y)))
-    return bool(off > _APART * noise / np.sqrt(FIRST))
+def _astray(rig: Rig, segment: Segment, begins: Sequence[Begin]) -> list[bool]:
+    """Which experiments' first samples are off from what their begins make of them by more than noise, and
+    than half a sample makes that columns may be out of step. Only those count that no input of the log can
+    have moved yet. What most of three or more are off by, alike, is a zero."""
+    if integrations(rig) or rig.integrator:
+        return [False] * len(begins)
+    off, least = np.zeros(len(begins)), np.full(len(begins), np.inf)
+    for number, ((first, last), begin) in enumerate(zip(segment.run.spans, begins)):
+        y = segment.y[first:last]
+        if len(y) < 2 * FIRST:
+            continue
+        made, count = _made(rig, segment, number, begin), _unmoved(segment.x[first:last], begin)
+        noise = max(white_level(y), _QUIET * float(np.ptp(y)))
+        off[number] = float(np.mean((y - made)[:count]))
+        least[number] = _APART * noise / np.sqrt(count) + 0.5 * abs(float(made[count] - made[count - 1]))
+    seen = np.isfinite(least)
+    if np.count_nonzero(seen) >= _SEVERAL:
+        beside = np.abs(off - np.median(off[seen])) > least
+        if np.count_nonzero(beside[seen]) <= 0.5 * np.count_nonzero(seen):
+            return [bool(each) for each in beside]
+    return [bool(each) for each in np.abs(off) > least]
+
+
+def _unmoved(x: np.ndarray, begin: Begin) -> int:
+    """How many first samples of an input (n,) are what it was before, and the next one; 1 at least, and as
+    many as are looked at at most."""
+    still = max(_APART * white_level(x), _QUIET * float(np.ptp(x)))
+    moved = np.abs(x[:FIRST] - begin.levels[-1]) > still
+    return int(np.argmax(moved)) + 1 if moved.any() else FIRST
 
 
 def _made(rig: Rig, segment: Segment, number: int, begin: Begin, placed: Sequence[Placed] = ()) -> np.ndarray:

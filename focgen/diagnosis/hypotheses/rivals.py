@@ -44,6 +44,12 @@ class Rival:
         family = library()[self.effect]
         return -np.inf if family.rounds else nominal_off(self.change, family.static, self.form)
 
+    @property
+    def of_form(self) -> bool:
+        """Whether the chain is off by its form, as its rig says, sooner than by part of the noise."""
+        family = library()[self.effect]
+        return not family.rounds and self.off > nominal_off(self.change, family.static)
+
 
 @dataclass(frozen=True, eq=False)
 class Cause:

@@ -173,8 +173,8 @@ def _nominal(causes: Sequence[tuple[Explanation, Cause]]) -> Iterator[str]:
     for e, cause in causes:
         first = cause.rivals[0]
         if (instead := nominal_instead(first)) > 1.0 - NUMBERS.held:
-            lacked = "its form lacked about as much when it was identified ([uncertainty] form); "
-            why = f"{lacked if first.form > 0.0 else ''}to tell, identify the rig from "
+            lacked = "its form lacks about as much, as its [uncertainty] says; "
+            why = f"{lacked if first.of_form else ''}to tell, identify the rig from "
             yield (
                 f"{_within(e)}: the nominal rig may be off by itself ({instead:.0%}) by what the "
                 f"{first.effect} changes, {first.change:.2g} of the noise; {why}logs of it as it should be"
