@@ -62,7 +62,7 @@ def begun_session(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...
 def _told(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
     """The experiments with the begins that their own first samples tell."""
     found = begun(rig, logs)
-    if not _away(found) and not _away(found := begun(_refitted(rig, logs)[0], logs)):
+    if not _away(found):
         return found
     at_rest = tuple(replace(log, begins={}, stands=0.0) for log in logs)
     for _ in range(_AGAIN):
