@@ -79,8 +79,7 @@ def diagnose(
     told = begun_as_found(explanations[0].best, rigs.fitted, rigs.placed, session)
     if not explanations[0].best.problem.stood:  # of a pump the fit says what it held
         told = min(told, session, key=lambda logs: gap(rigs.fitted, rigs.placed, logs))
-    session = told
-    session = in_windows(rigs.fitted, session, rigs.placed)
+    session = in_windows(rigs.fitted, told, rigs.placed)
     if only is None:
         explanations, rigs = where_it_is_seen(nominal, explanations, rigs, session)
     rigs, diagnosis, evidence = conclude(nominal, session, rigs, explanations, ran, only is not None)

@@ -34,10 +34,10 @@ def unlogged_reference(log: Experiment) -> Array | None:
     if not (np.all(np.isfinite(u)) and np.all(np.isfinite(y)) and min(np.ptp(u), np.ptp(y)) > 0.0):
         return None
     free = _moving(u)
-    found = [(gain, later) for later in _LATER if (gain := _gain(u, y, free, later))]
-    if not found:
+    gains = ((_gain(u, y, free, later), later) for later in _LATER)
+    gain, later = next((each for each in gains if each[0]), (0.0, 0))
+    if not gain:
         return None
-    gain, later = found[0]
     asked = u + gain * np.r_[np.full(later, y[0]), y[: len(y) - later]]
     places = np.arange(len(u))
     made: Array = np.interp(places, places[free], asked[free])
@@ -58,30 +58,21 @@ def _gain(u: Array, y: Array, free: Bools, later: int) -> float:
     seen = np.convolve(free, np.ones(_PAST + 1), "valid") > _PAST
     if np.count_nonzero(seen) < _FEWEST:
         return 0.0
-    new, read = (v[seen] for v in (_new(u, y, seen), _new(y, u, seen)))
+    _, new = _foretold(u, y, seen)
+    shares, read = _foretold(y, u, seen)
+    new, read = new[seen], read[seen]
     if not _typical(new) > _MOVES * np.ptp(u) or not _typical(read) > 0.0:
         return 0.0
-    together = float(np.corrcoef(_usual(new), _usual(read))[0, 1])
-    if not together * np.sign(_answer(y, u, seen)) < -_TOGETHER:
+    together, answer = np.corrcoef(_usual(new), _usual(read))[0, 1], np.sum(shares[_PAST + 1 :])
+    if not together * np.sign(answer) < -_TOGETHER:
         return 0.0
     usual = (np.abs(new) < _FAR * _typical(new)) & (np.abs(read) < _FAR * _typical(read))
     return -float(new[usual] @ read[usual]) / float(read[usual] @ read[usual])
 
 
-def _new(values: Array, other: Array, seen: Bools) -> Array:
-    """What the samples before, and those of the ``other`` signal, do not foretell of each (n − 6,); fitted
-    where they are ``seen``."""
-    return _foretold(values, other, seen)[1]
-
-
-def _answer(values: Array, other: Array, seen: Bools) -> float:
-    """What a signal makes of the samples before of the ``other`` one, in all."""
-    return float(np.sum(_foretold(values, other, seen)[0][_PAST + 1 :]))
-
-
 def _foretold(values: Array, other: Array, seen: Bools) -> tuple[Array, Array]:
-    """How much of a constant and of the samples before, its own and the other's, there is in each (13,), and
-    what is new in it (n − 6,)."""
+    """How much of a constant and of the samples before, its own and the ``other`` signal's, there is in each
+    (13,), fitted where they are ``seen``, and what is new in it (n − 6,)."""
     count = len(values) - _PAST
     before = [v[_PAST - k - 1 :][:count] for v in (values, other) for k in range(_PAST)]
     rows, target, kept = np.stack([np.ones(count), *before], axis=1), values[_PAST:], seen
