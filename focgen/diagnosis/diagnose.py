@@ -30,7 +30,7 @@ from focgen.replaced import check_own
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.initial import in_windows
 from focgen.rig.plausibility import doubts
-from focgen.rig.replay import after_session, experiments, with_known
+from focgen.rig.replay import after_session, experiments, held_by_a_controller, with_known
 
 WRITTEN = ("diagnosis.json", "signals.json", "refitted.toml", "augmented.toml")  # beside the pictures
 
@@ -71,6 +71,7 @@ def diagnose(
     session = after_session(nominal, usable(experiments(nominal, each, from_, to)))
     ran = None if which is None else check_controller(which, session)
     nominal, session = decimated(nominal, session)
+    nominal = held_by_a_controller(nominal, session)
     session = with_readings(session)
     session = begun_session(nominal, session)
     logged, found = session, found_in(nominal, session, only, bootstrap)

@@ -14,6 +14,7 @@ from focgen.errors import LogError, RigError
 from focgen.jsontext import UNWRITTEN
 from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
+from focgen.logs.feedback import answers_reading
 from focgen.logs.notes import notes_of
 from focgen.logs.rates import at_one_rate
 from focgen.logs.read import Logs, read_logs
@@ -132,11 +133,18 @@ def simulate_session(
     return [{LEAVES[stage]: y[a:b] for stage, y in tap.items()} for a, b in run.spans]
 
 
+def held_by_a_controller(rig: Rig, logs: Sequence[Experiment]) -> Rig:
+    """The rig with its command held between samples, where it does not say what that does and a log shows a
+    controller: what is made of a reading cannot have moved there ahead of it."""
+    made = rig.between is None and any(answers_reading(log) for log in logs)
+    return replace(rig, between=Between.HELD) if made else rig
+
+
 def told_between(rig: Rig, logs: Sequence[Experiment]) -> Rig:
     """The rig with what its first input does between its samples, where the rig does not say it and the logs
     do: what :func:`between_of` says, unless the output comes much closer to another way. A pressure runs in
     lines, and may be held where it only jumps and rests."""
-    entry = entry_of(logs)
+    rig, entry = held_by_a_controller(rig, logs), entry_of(logs)
     if rig.between is not None or not all(entry in log and "output" in log for log in logs):
         return rig
     usual, likely, closer = between_of(rig, entry), list(Between), _CLOSER

@@ -31,7 +31,7 @@ def loop(seed, gain, later=0, limit=np.inf, colour=0.0):
 
 
 @pytest.mark.parametrize("gain", [0.2, 1.0, 3.0])
-@pytest.mark.parametrize("later", [0, 1])
+@pytest.mark.parametrize("later", [0, 1, 2, 3])
 @pytest.mark.parametrize("limit, colour", [(np.inf, 0.0), (1.2, 0.0), (np.inf, 0.8)])
 def test_the_output_s_noise_is_taken_out_of_the_command(gain, later, limit, colour):
     log, e = loop(7, gain, later, limit, colour)
@@ -82,6 +82,19 @@ def test_a_rig_of_negative_gain_that_answers_within_the_sample_is_no_loop():
         u = lfilter([1.0], [1.0, -0.9], rng.normal(size=N))
         y = -1.5 * lfilter([1.0 - pole], [1.0, -pole], u)
         y = y + rng.normal(0.0, 0.01 * np.std(y), N)
+        assert unlogged_reference(Experiment("e", 0.1, {"command": u, "output": y})) is None
+
+
+@pytest.mark.parametrize("colour", [0.0, 0.9])
+@pytest.mark.parametrize("noise", [0.0, 1e-4, 1e-3, 0.01, 0.1])
+def test_a_rig_that_answers_within_the_sample_alone_is_no_loop(colour, noise):
+    """Of those whose last samples have no part in the next reading, half were taken for loops."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        pole = np.exp(-1.0 / rng.choice([0.5, 3.0, 20.0]))
+        u = lfilter([1.0], [1.0, -colour], rng.normal(size=N))
+        y = lfilter([1.0 - pole], [1.0, -pole], u)
+        y = y + rng.normal(0.0, 1.0, N) * noise * np.std(y)
         assert unlogged_reference(Experiment("e", 0.1, {"command": u, "output": y})) is None
 
 

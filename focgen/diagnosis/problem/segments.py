@@ -216,7 +216,7 @@ def make(
     input_modes = np.zeros((len(x), 0)) if input_modes is None else input_modes
     names = tuple(log.name for log in logs)
     led = [exit == "output" and _is_led(log) for log in logs]
-    hidden = [_hidden(log) if entry == "command" and exit == "output" else None for log in logs]
+    hidden = [_hidden(log) if exit == "output" else None for log in logs]
     closed = [_is_closed(log) for log in logs]
     looped = any(closed) or any(made is not None for made in hidden)
     trust = np.concatenate([_trust(np.asarray(log[exit], float), _unsteadiness(log)) for log in logs])
@@ -230,12 +230,12 @@ def make(
         Between.HELD if entry == "command" else Between.STRAIGHT,
         names,
         trust,
-        _asked(logs, x, led, hidden),
+        _asked(logs, x, led, _as_input(hidden, entry, x)),
         any(led),
         looped,
         input_modes[:, _felt(input_modes, x, y)],
         np.zeros((len(x), 0)),
-        wanted=_asked(logs, x, closed, hidden) if looped else np.zeros(0),
+        wanted=_asked(logs, x, closed, _as_input(hidden, entry, x)) if looped else np.zeros(0),
         band=dead_band(y),
         passed=_passed(logs, entry),
     )
@@ -247,7 +247,15 @@ def _passed(logs: Sequence[Experiment], entry: str) -> dict[str, np.ndarray]:
     """By role the logged signals (n,) up to the input, of order one."""
     roles = [r for r in _ORDER[: _ORDER.index(entry) + 1] if all(r in log for log in logs)]
     signals = {role: joined(logs, role) for role in roles}
+    if "command" in signals:
+        signals["command"] = np.concatenate([_made_ahead(log) for log in logs])
     return {role: x / (float(np.max(np.abs(x))) or 1.0) for role, x in signals.items()}
+
+
+def _made_ahead(log: Experiment) -> np.ndarray:
+    """The command (n,) without its part of the present reading, where a controller made it of that."""
+    made = unlogged_reference(log)
+    return np.asarray(log["command"], float) if made is None else made
 
 
 def _readings(logs: Sequence[Experiment], role: str) -> Ints | None:
@@ -288,6 +296,13 @@ def _hidden(log: Experiment) -> np.ndarray | None:
     """What was asked of the rig in a loop whose reference nobody logged, or never moved; None where there is
     no such loop."""
     return None if _is_led(log) else unlogged_reference(log)
+
+
+def _as_input(hidden: Sequence[np.ndarray | None], entry: str, x: np.ndarray) -> list[np.ndarray | None]:
+    """What was asked in hidden loops in the unit of the input: behind the first stage, as large as that."""
+    most = max((float(np.max(np.abs(h))) for h in hidden if h is not None), default=1.0) or 1.0
+    by = 1.0 if entry == "command" else float(np.max(np.abs(x))) / most
+    return [None if h is None else by * h for h in hidden]
 
 
 def _is_led(log: Experiment) -> bool:
