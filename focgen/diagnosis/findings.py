@@ -37,7 +37,7 @@ from focgen.diagnosis.problem.segments import cuts, make
 from focgen.diagnosis.problem.smooth import freed, is_explained, slow_rest, strays
 from focgen.diagnosis.verdict import compose
 from focgen.diagnosis.verdict.at_the_output import seen_at_the_output
-from focgen.diagnosis.verdict.in_between import hiding, leaves_far_less, without
+from focgen.diagnosis.verdict.in_between import hiding, leaves_far_less, tell_the_same, without
 from focgen.diagnosis.verdict.unexplained import is_noise, is_unknown
 from focgen.logs.experiment import Experiment
 from focgen.progress import step
@@ -102,7 +102,8 @@ def unhidden(found: Findings, session: tuple[Experiment, ...], bootstrap: int) -
         step(f"without the {role}")
         bare = found_in(found.nominal, without(session, role), None, bootstrap)
         closer = leaves_far_less(bare.rigs, bare.session, found.rigs, found.session)
-        if closer and not any(map(is_unknown, bare.explanations)):
+        more = not tell_the_same(bare.explanations, found.explanations)
+        if closer and more and not any(map(is_unknown, bare.explanations)):
             return bare
     return found
 

@@ -20,7 +20,7 @@ from focgen.rig.dynamics import FREE, SAME, STEADY, UNCHANGED, Dynamics, Lever, 
 from focgen.rig.effects import EQUATIONS, Run
 from focgen.rig.lever import levered
 from focgen.rig.modes import respond
-from focgen.rig.placed import Placed
+from focgen.rig.placed import EARLY, LAST, LATE, Placed
 from focgen.rig.rig import UNITY, Actuator, LinearActuator, Rig
 from focgen.rig.stages import STAGES
 from focgen.rig.weak import can_be_solved, solved_weak, weakened
@@ -138,16 +138,15 @@ class Chain:
     def steps(self, stage: str, between: Between | bool) -> list[Step]:
         """What a signal passes in a stage, in order; ``between``: what it does from one sample to the
         next."""
-        early, late = ("command", "load", "strain"), ("supply", "response", "reading")
         here = [p for p in self.placed if p.stage == stage]
-        if any(p.form.leads and p.slot in early for p in here):
+        if any(p.form.leads and p.slot in EARLY for p in here):
             between = Between.STRAIGHT  # what was held is smooth behind a lag
-        steps = [_effect(p) for p in here if p.slot in early]
+        steps = [_effect(p) for p in here if p.slot in EARLY]
         steps += self._core(stage, here, between)
-        steps += [_effect(p) for p in here if p.slot in late]
+        steps += [_effect(p) for p in here if p.slot in LATE]
         if stage == "actuator" and (offset := self._offset):
             steps.append((("offset", offset), lambda x, run: x + offset, None))
-        steps += [_effect(p) for p in here if p.slot == "place"]
+        steps += [_effect(p) for p in here if p.slot in LAST]
         if stage == "sensor" and (zero := self.rig.zero):
             steps.append((("offset", zero), lambda x, run: x + zero, None))
         return steps

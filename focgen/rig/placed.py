@@ -8,6 +8,9 @@ from dataclasses import dataclass, field, replace
 from focgen.arrays import Array
 from focgen.rig.effects import EQUATIONS, SLOTS, Form, Run, library
 
+EARLY, LATE, LAST = ("command", "load", "strain"), ("supply", "response", "reading"), ("place",)
+"""The slots ahead of a stage's own dynamics, behind them, and behind its offset."""
+
 
 @dataclass(frozen=True)
 class Placed:
@@ -49,6 +52,13 @@ class Placed:
     def slot(self) -> str:
         """Where it acts: the form's slot, or the like one of the stage it was moved to."""
         return slot_in(self.form, self.stage)
+
+
+def on_one_side(one: tuple[Form, str], other: tuple[Form, str]) -> bool:
+    """Whether two forms in their stages are passed one right after the other, so that either may come
+    first."""
+    slots = [slot_in(*placed) for placed in (one, other)]
+    return one[1] == other[1] and any(all(slot in side for slot in slots) for side in (EARLY, LATE, LAST))
 
 
 def slot_in(form: Form, stage: str) -> str:

@@ -20,6 +20,7 @@ from focgen.diagnosis.hypotheses.foretelling import foretelling
 from focgen.diagnosis.hypotheses.left import remembers, unleft
 from focgen.diagnosis.hypotheses.longer_path import borne_out, may_show_more, times_as_long
 from focgen.diagnosis.hypotheses.nuisances import may_be_more, uncertain
+from focgen.diagnosis.hypotheses.order import in_their_order
 from focgen.diagnosis.hypotheses.rivals import Beside, Cause, Examined, lack_of, left_out, reexamined
 from focgen.diagnosis.hypotheses.search import Ranking, evidence, rank
 from focgen.diagnosis.hypotheses.seen_through import with_steps
@@ -329,7 +330,7 @@ def _grown(
             continue
         if best is None:
             break
-        best = _widened_beside(best, asked.threshold)
+        best = _widened_beside(in_their_order(best), asked.threshold)
         base, vector = best.problem, best.vector
     return rankings, candidates
 

@@ -19,6 +19,7 @@ from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.segments import make
 from focgen.diagnosis.verdict import compose
+from focgen.diagnosis.verdict.confidence import tied
 from focgen.logs.experiment import Experiment
 from focgen.rig.initial import in_windows
 from focgen.rig.session import joined
@@ -39,6 +40,14 @@ def leaves_far_less(
     """Whether effects found without the signal bring the output far closer than what was found with it."""
     found, before = compose.gap(bare.fitted, bare.placed, shown), compose.gap(rigs.fitted, rigs.placed, logs)
     return bool(bare.placed) and found < NUMBERS.unlikely * before
+
+
+def tell_the_same(bare: Sequence[Explanation], found: Sequence[Explanation]) -> bool:
+    """Whether what is found without the signal may all be what was ``found`` with it. Then that tells the
+    stages as well, and what it leaves more is the error of its numbers."""
+    named = [(c.rivals[0].effect, c.rivals[0].stage) for e in found for c in e.causes]
+    seen = [{(r.effect, r.stage) for r in tied(c.rivals)[0]} for e in bare for c in e.causes]
+    return all(any(name in rivals for name in named) for rivals in seen)
 
 
 def without(logs: Sequence[Experiment], role: str) -> tuple[Experiment, ...]:

@@ -16,8 +16,11 @@ def _turbulent(x: Array, values: Values, run: Run) -> Array:
 
 
 def _growing(x: Array, values: Values, run: Run) -> Array:
+    """A loss that grows with the square. What would be there without it goes beyond the ``scale``, the
+    largest that is measured behind it; beyond the crest nothing more comes through."""
     share, scale = values
-    return x * (1.0 - share * np.minimum(np.abs(x) / scale, 1.0))
+    size = np.minimum(np.abs(x) / scale, 0.5 / max(share, 1e-12))
+    return np.sign(x) * scale * size * (1.0 - share * size)
 
 
 def _running_out(x: Array, values: Values, run: Run) -> Array:

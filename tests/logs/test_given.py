@@ -1,0 +1,62 @@
+"""Experiments that a program made by itself are looked at like a file.
+
+Red when one that no rig can be run on goes through, or is refused without its name, what is wrong and a remedy,
+and when a whole one is changed or copied.
+"""
+
+import numpy as np
+import pytest
+
+from focgen import replay
+from focgen.errors import LogError
+from focgen.logs.experiment import Experiment
+from focgen.logs.given import checked_in_memory
+from focgen.rig.rig import Actuator, Rig, Signals
+
+U = np.repeat([0.0, 0.5, 0.2], 100)
+RIG = Rig("finger", 0.02, Signals("t", "y", command="u"), Actuator(0.5, 0.8, (1.0,)))
+
+
+def logged(h=0.02, **signals):
+    return Experiment("e7", h, {"command": U, "output": U} | signals)
+
+
+def with_at(sample, value):
+    return np.where(np.arange(len(U)) == sample, value, U)
+
+
+BAD = {
+    "300 samples of command and 295 of output": logged(output=U[5:]),
+    "has the shape (300, 1)": logged(output=U[:, None]),
+    "has no signals": Experiment("e7", 0.02, {}),
+    "has no samples": Experiment("e7", 0.02, {"command": U[:0], "output": U[:0]}),
+    "has a signal 'comand'": logged(comand=U),
+    "output: is not a series of real numbers": logged(output=np.array(["a"] * len(U))),
+    "command: is not a series of real numbers": logged(command=U + 1j),
+    "has gaps, the first at sample 40": logged(output=with_at(40, np.nan)),
+    "is inf at sample 50": logged(command=with_at(50, np.inf)),
+    "is 1e+200 at sample 3": logged(output=with_at(3, 1e200)),
+    "has the sample time 0": logged(h=0),
+    "has the sample time nan": logged(h=float("nan")),
+    "has the sample time '0.02'": logged(h="0.02"),
+    "has the sample time True": logged(h=True),
+}
+
+
+@pytest.mark.parametrize("said", BAD)
+def test_what_no_rig_can_be_run_on_is_refused(said):
+    with pytest.raises(LogError, match="e7") as refused:
+        replay(RIG, [BAD[said]])
+    assert said in str(refused.value) and "; " in str(refused.value)
+
+
+def test_a_whole_one_is_itself():
+    log = logged(reference=with_at(3, np.nan))
+    assert checked_in_memory(log) is log
+
+
+def test_lists_and_whole_numbers_will_do():
+    made = checked_in_memory(logged(command=list(U), output=(10.0 * U).astype(int)))
+    np.testing.assert_array_equal(made["command"], U)
+    np.testing.assert_array_equal(made["output"], 10.0 * U)
+    assert made["output"].dtype == float
