@@ -1,7 +1,7 @@
 """Experiments that a program made by itself are looked at like a file.
 
-Red when one that no rig can be run on goes through, or is refused without its name, what is wrong and a remedy,
-and when a whole one is changed or copied.
+Red when one that no rig can be run on goes through, or is refused without its name, what is wrong and
+a remedy, and when a whole one is changed or copied.
 """
 
 import numpy as np
