@@ -19,7 +19,7 @@ from focgen.arrays import Array
 from focgen.logs.experiment import Experiment
 from focgen.rig.rig import UNITY, Rig
 from focgen.trials.belongs import logs_of_case
-from focgen.trials.severity import Trial, moved_rigs, rms
+from focgen.trials.severity import Trial, below_one, moved_rigs, rms
 
 _STEP = 0.01
 _STAGES = {
@@ -78,7 +78,7 @@ def _look(
     rig: Rig, logs: Sequence[Experiment], inputs: str, name: str, effects: Sequence[str]
 ) -> tuple[float, str]:
     """Relative residual of the part from ``inputs`` to ``name``, and the best-looking of ``effects``."""
-    part = _part(rig, inputs, name)
+    part = below_one(_part(rig, inputs, name))
     every = round(rig.sample_time / _STEP)
     trial = Trial([np.repeat(log[inputs], every) for log in logs], [log.start for log in logs], _STEP)
     made = trial.signals(part)[name][::every]

@@ -36,6 +36,7 @@ VISIBLE = 0.3
 _USUAL = 3.0  # times the uncertainty of what was given: as far off is no fault
 _OUT_OF_STEP = 0.5  # of a sample: what a logger leaves open
 _ZERO = 0.005  # of a span: what the zero of a gauge differs by from one experiment to the next
+_BELOW = 0.99  # an order that can be moved either way and stays below 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +133,14 @@ def _refitted(columns: Array, most: Array, target: Array) -> Array:
 
 def _stacked(signals: Mapping[str, Array], noise: dict[str, float]) -> Array:
     return np.concatenate([signals[name] / noise[name] for name in signals])
+
+
+def below_one(rig: Rig) -> Rig:
+    """The rig with an order below 1, where the generator's scheme holds and the order can be moved either
+    way."""
+    if not isinstance(rig.actuator, Actuator) or rig.actuator.alpha <= _BELOW:
+        return rig
+    return replace(rig, actuator=replace(rig.actuator, alpha=_BELOW))
 
 
 def moved_rigs(rig: Rig) -> Iterator[tuple[Rig, float]]:

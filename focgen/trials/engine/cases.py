@@ -10,7 +10,7 @@ import numpy as np
 
 from focgen.arrays import Array
 from focgen.fractional.transfer import TransferFunction
-from focgen.rig.rig import Actuator, Ranges, Rig
+from focgen.rig.rig import Ranges, Rig
 from focgen.trials import patterns
 from focgen.trials.cases import FINE, Bench, Case, clocks_of, label_of, programme
 from focgen.trials.engine.bodies import Body
@@ -22,7 +22,7 @@ from focgen.trials.machine import Setting
 from focgen.trials.plan import Assignment
 from focgen.trials.recording import MEASURED, Recorder, draw_recorder, floor_of
 from focgen.trials.rigs import Units, columns_of, draw_regulator, draw_units, nominal_of
-from focgen.trials.severity import SEVERITIES, VISIBLE, Trial, calibrate, surviving
+from focgen.trials.severity import SEVERITIES, VISIBLE, Trial, below_one, calibrate, surviving
 from focgen.trials.vocabulary import draw_form
 
 _COARSE = 0.005  # s: step of the calibration
@@ -132,20 +132,13 @@ def _draw(
 
 def _seen(facts: dict[str, Any], setting: Setting, scene: Scene, recorder: Recorder) -> dict[str, Any]:
     """Add how much of the effect the logs can show, once the rig's nominal parameters are refitted."""
-    rig = _smooth(scene.true.rig)
+    rig = below_one(scene.true.rig)
     logged = [name for name in MEASURED if name in rig.signals.columns()]
     whole, without = (scene.trial.signals(scene.true, s) for s in ((setting,), ()))
     gap = {n: whole[n] - without[n] for n in logged}
     plain = Trial(scene.trial.commands, scene.trial.clocks, scene.trial.h)
     left = surviving(rig, plain, gap, {n: recorder.noise[n] for n in logged})
     return {**facts, "survives": left, "visible": max(left.values()) >= VISIBLE}
-
-
-def _smooth(rig: Rig) -> Rig:
-    """The rig with an order just below 1, where the order can be moved either way in the other simulator."""
-    if not isinstance(rig.actuator, Actuator):
-        return rig
-    return replace(rig, actuator=replace(rig.actuator, alpha=0.99))
 
 
 def _play(
