@@ -23,6 +23,7 @@ from focgen.diagnosis.verdict.compose import gap
 from focgen.diagnosis.verdict.conclude import conclude
 from focgen.diagnosis.verdict.evidence import drawn_of
 from focgen.diagnosis.verdict.in_between import with_signals
+from focgen.logs.feedback import told_of_its_loop
 from focgen.logs.filled import with_readings
 from focgen.logs.read import Logs, each_of
 from focgen.output import check_apart, check_writable
@@ -71,7 +72,7 @@ def diagnose(
     session = after_session(nominal, usable(experiments(nominal, each, from_, to)))
     ran = None if which is None else check_controller(which, session)
     nominal, session = decimated(nominal, session)
-    nominal = held_by_a_controller(nominal, session)
+    nominal, session = held_by_a_controller(nominal, session), tuple(map(told_of_its_loop, session))
     session = with_readings(session)
     session = begun_session(nominal, session)
     logged, found = session, found_in(nominal, session, only, bootstrap)

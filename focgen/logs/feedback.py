@@ -8,6 +8,7 @@ it does later on, and a controller moves the command against that. One that read
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -16,6 +17,10 @@ from scipy.signal import lfilter
 from focgen.arrays import Array, Bools
 from focgen.logs.experiment import Experiment
 
+_NOTE = (
+    "the command answers the output's noise, as a controller's does: a loop was closed; log what it was "
+    "asked for, too (reference in [signals])"
+)
 _PAST = 6  # samples of both that the next one is foretold by
 _FITTED = 3  # rounds, each without what was far from foretold
 _FAR = 3.0  # deviations: what is farther is a step, and no noise
@@ -47,6 +52,14 @@ def answers_reading(log: Experiment) -> bool:
     """Whether a controller made the command of the output's readings, whether its reference was logged or
     not."""
     return _answer(log)[0] != 0.0
+
+
+def told_of_its_loop(log: Experiment) -> Experiment:
+    """The experiment with a note where a loop was closed whose reference tells nothing."""
+    lacks = "reference" not in log or np.ptp(log["reference"]) == 0.0
+    if not lacks or _NOTE in log.notes or not answers_reading(log):
+        return log
+    return replace(log, notes=(*log.notes, _NOTE))
 
 
 def _answer(log: Experiment) -> tuple[float, int]:

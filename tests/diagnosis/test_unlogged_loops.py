@@ -12,6 +12,7 @@ from focgen.diagnosis.problem.segments import make
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
+from focgen.logs.feedback import told_of_its_loop
 from focgen.rig.replay import held_by_a_controller
 from focgen.rig.rig import LinearActuator, Rig, Signals
 
@@ -59,6 +60,7 @@ def test_a_healthy_rig_in_such_a_loop_is_quiet(roles, seed):
     found = diagnose(rig_of(roles), session(seed, roles), pictures=False)
     assert found.verdict in ("none", "parameters")
     assert found.gap.refitted < 1.1 * found.gap.floor
+    assert sum("a loop was closed" in note for note in found.notes) == 1
 
 
 def test_a_reading_that_ends_is_named_in_it():
@@ -91,3 +93,5 @@ def test_a_command_made_of_a_reading_is_held(reference):
     assert held_by_a_controller(rig_of(roles), logs).between == Between.HELD
     opened = [Experiment(log.name, H, {**log.signals, "command": np.sort(log["command"])}) for log in logs]
     assert held_by_a_controller(rig_of(roles), opened).between is None
+    assert any("a loop was closed" in note for note in told_of_its_loop(logs[0]).notes) != reference
+    assert told_of_its_loop(opened[0]) is opened[0]
