@@ -10,7 +10,7 @@ from focgen.arguments import checked
 from focgen.control.files import ControllerLike, controller_from
 from focgen.control.units import check_one_unit
 from focgen.diagnosis.asked import check_asked, usable
-from focgen.diagnosis.controller.check import check_controller
+from focgen.diagnosis.controller.check import ControllerCheck, check_controller
 from focgen.diagnosis.findings import found_in, unhidden, where_it_is_seen
 from focgen.diagnosis.hypotheses.initial import (
     begun_as_found,
@@ -18,11 +18,14 @@ from focgen.diagnosis.hypotheses.initial import (
 )
 from focgen.diagnosis.model import Diagnosis
 from focgen.diagnosis.problem.decimate import decimated
+from focgen.diagnosis.proposals.menu import Choice
 from focgen.diagnosis.proposals.next_experiment import NEXT, propose
+from focgen.diagnosis.turned import turned_back
 from focgen.diagnosis.verdict.compose import gap
 from focgen.diagnosis.verdict.conclude import conclude
 from focgen.diagnosis.verdict.evidence import drawn_of
 from focgen.diagnosis.verdict.in_between import with_signals
+from focgen.logs.experiment import Experiment
 from focgen.logs.feedback import told_of_its_loop
 from focgen.logs.filled import with_readings
 from focgen.logs.read import Logs, each_of
@@ -32,6 +35,8 @@ from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.initial import in_windows
 from focgen.rig.plausibility import doubts
 from focgen.rig.replay import after_session, experiments, held_by_a_controller, with_known
+from focgen.rig.rig import Rig
+from focgen.rig.turned import turn_of, with_its_way
 
 WRITTEN = ("diagnosis.json", "signals.json", "refitted.toml", "augmented.toml")  # beside the pictures
 
@@ -71,6 +76,28 @@ def diagnose(
         check_one_unit(nominal, which)
     session = after_session(nominal, usable(experiments(nominal, each, from_, to)))
     ran = None if which is None else check_controller(which, session)
+    nominal = with_its_way(nominal, session)
+    turn = turn_of(nominal)
+    if turn.roles:
+        session, nominal = tuple(turn.log(log, nominal) for log in session), turn.rig(nominal)
+    diagnosis, asked = _diagnosed(nominal, session, ran, only, bootstrap)
+    diagnosis = turned_back(diagnosis, turn) if turn.roles else diagnosis
+    if out is not None:
+        from focgen.diagnosis.write import write
+
+        write(out, diagnosis, asked, pictures, given)
+    return diagnosis
+
+
+def _diagnosed(
+    nominal: Rig,
+    session: tuple[Experiment, ...],
+    ran: ControllerCheck | None,
+    only: Sequence[str] | None,
+    bootstrap: int,
+) -> tuple[Diagnosis, Choice | None]:
+    """The diagnosis of a session whose signals rise from 0, and the experiment to make next, None where there
+    is none; ``ran``: what the session says of its controller."""
     nominal, session = decimated(nominal, session)
     nominal, session = held_by_a_controller(nominal, session), tuple(map(told_of_its_loop, session))
     session = with_readings(session)
@@ -94,11 +121,7 @@ def diagnose(
         augmented=rigs.augmented(session, diagnosis.shrink),
         drawn=drawn_of(rigs.refitted, evidence, session),
     )
-    if out is not None:
-        from focgen.diagnosis.write import write
-
-        write(out, diagnosis, proposed[1] if proposed else None, pictures, given)
-    return diagnosis
+    return diagnosis, proposed[1] if proposed else None
 
 
 def _check_place(out: Path, given: Sequence[object]) -> None:

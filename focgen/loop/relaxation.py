@@ -28,6 +28,7 @@ from focgen.rig.placed import Placed
 from focgen.rig.replay import placed_in, session_end
 from focgen.rig.rig import Rig
 from focgen.rig.stages import LEAVES
+from focgen.rig.turned import turn_of
 
 _WINDOWS = 24  # that a run is cut into: the fewer, the more passes each
 _PASSES = 40  # after which a window is halved
@@ -72,8 +73,11 @@ class Plant:
         x[0] = x[0] if held else idle
         run = Run.of([count + 1], [self.clock], h)
         tap: dict[str, Array] = {}
-        Chain(self.rig, self.placed).run(x, "regulator", "sensor", run, held, tap)
-        return {LEAVES[stage]: y[self.lead * self.parts :] for stage, y in tap.items()}
+        turn = turn_of(self.rig)
+        x = turn.signs["command"] * x
+        Chain(turn.rig(self.rig), self.placed).run(x, "regulator", "sensor", run, held, tap)
+        made = turn.signals({LEAVES[stage]: y for stage, y in tap.items()})
+        return {role: y[self.lead * self.parts :] for role, y in made.items()}
 
 
 def _delays(regulator: TransferFunction) -> bool:

@@ -15,6 +15,7 @@ from focgen.errors import RigError
 from focgen.fractional.terms import read_transfer, terms_of
 from focgen.fractional.transfer import Polynomial, TransferFunction
 from focgen.logs.between import Between
+from focgen.logs.experiment import ROLES
 from focgen.logs.scales import Scale
 from focgen.output import write_file
 from focgen.rig.rig import (
@@ -62,6 +63,7 @@ def read_rig(path: str | Path | Mapping[str, Any]) -> Rig:
         delays=delays,
         uncertainty=_uncertainty(top.table("uncertainty")),
         between=_between(top.section("signals", _WHICH)),
+        downwards=_downwards(top.section("signals", _WHICH)),
     )
     top.table(TABLE)  # tells where the rig is from, and nothing of what it is
     top.done()
@@ -75,6 +77,7 @@ def _signals(top: Table) -> Signals:
     named = {role: _column(table, role) for role in _ROLES}
     found = {role: column for role, (column, _) in named.items()} | {"run": table.text("run")}
     table.text("between")
+    table.raw("downwards")
     table.done()
     if found["command"] is None and found["pressure"] is None:
         raise table.fail(None, "has neither 'command' nor 'pressure'", "name the column of the input")
@@ -100,6 +103,14 @@ def _between(table: Table) -> Between | None:
         known = ", ".join(repr(way.name.lower()) for way in Between)
         raise table.fail("between", f"is {word!r}", f"give one of {known}, or leave it to the logs")
     return Between[word.upper()]
+
+
+def _downwards(table: Table) -> frozenset[str]:
+    """The roles whose signals effects count from 0 down."""
+    roles = table.raw("downwards", [])
+    if not isinstance(roles, list) or not all(role in ROLES for role in roles):
+        raise table.fail("downwards", f"is {roles!r}", f"give a list of {', '.join(ROLES)}")
+    return frozenset(roles)
 
 
 def _column(table: Table, role: str) -> tuple[str | None, Scale | None]:
@@ -278,9 +289,7 @@ def rig_text(rig: Rig) -> str:
 def rig_table(rig: Rig) -> dict[str, Any]:
     """The rig as nested dictionaries, in the order of the file."""
     table: dict[str, Any] = {"name": rig.name, "sample_time": rig.sample_time}
-    table["signals"] = _signals_table(rig.signals)
-    if rig.between is not None:
-        table["signals"]["between"] = rig.between.name.lower()
+    table["signals"] = _signals_table(rig.signals) | _input_table(rig)
     if rig.signals.units:
         table["units"] = dict(rig.signals.units)
     for key in ("regulator", "sensor"):
@@ -311,6 +320,12 @@ def _bounds_table(rig: Rig) -> dict[str, Any]:
     if uncertain:
         table["uncertainty"] = {key: _relative_table(part, usual[key]) for key, part in uncertain.items()}
     return table
+
+
+def _input_table(rig: Rig) -> dict[str, Any]:
+    """What the file says of the rig's input, where it says something."""
+    table: dict[str, Any] = {} if rig.between is None else {"between": rig.between.name.lower()}
+    return table | ({"downwards": [r for r in ROLES if r in rig.downwards]} if rig.downwards else {})
 
 
 def _signals_table(signals: Signals) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from focgen.logs.rates import at_one_rate
 from focgen.logs.read import Logs, read_logs
 from focgen.logs.still import check_moving
 from focgen.logs.table import LARGEST
+from focgen.present import present
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.effects import Parameter, library
 from focgen.rig.engine import Chain, between_of
@@ -31,6 +32,7 @@ from focgen.rig.response import check_bounded, longest
 from focgen.rig.rig import Rig
 from focgen.rig.session import entering, entry_of, jumps_and_rests, run_of
 from focgen.rig.stages import LEAVES, STAGES
+from focgen.rig.turned import turn_of
 from focgen.shown import Shown
 
 _CLOSER = 0.05  # of the mean square that the usual way of a command leaves: less, and another one is right
@@ -72,6 +74,20 @@ def replay(rig: RigLike, logs: Logs, from_: float | None = None, to: float | Non
     """
     given = rig_of(rig)
     session = experiments(given, logs, from_, to)
+    turn = turn_of(given)
+    if given.effects and turn.roles:
+        turned = _replayed(turn.rig(given), [turn.log(log, given) for log in session])
+        back = {name: turn.signals(made) for name, made in turned.simulated.items()}
+        rig, session = (
+            turn.rig(present(turned.rig)),
+            tuple(turn.log(log, given) for log in turned.experiments),
+        )
+        return replace(turned, simulated=back, rig=rig, experiments=session)
+    return _replayed(given, session)
+
+
+def _replayed(given: Rig, session: Sequence[Experiment]) -> Replay:
+    """The replay of a rig whose effects count as its signals are."""
     told = told_between(given, session)
     session = _lasting(told, _with_past(told, session))
     simulated = simulate_session(told, session)

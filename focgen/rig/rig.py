@@ -170,8 +170,10 @@ class Ranges:
 class Rig:
     """The nominal rig. ``sample_time`` in s; ``effects`` are the ``[[effects]]`` tables as read; ``between``:
     what its first input does from one sample to the next, None where logs are to tell. ``zero``: what is
-    added to the sensor's reading, in the output's unit. ``known``: effects
-    (:class:`focgen.rig.placed.Placed`) that are run wherever the rig is, as its numbers are; of no file."""
+    added to the sensor's reading, in the output's unit. ``downwards``: the roles whose signals effects count
+    from 0 down. Of no file are ``known``, effects (:class:`focgen.rig.placed.Placed`) that are run wherever
+    the rig is, as its numbers are, and ``turned``, the roles whose signals it is run with the other sign of
+    (:mod:`focgen.rig.turned`)."""
 
     name: str
     sample_time: float
@@ -185,7 +187,13 @@ class Rig:
     uncertainty: Uncertainty = Uncertainty()
     between: Between | None = None
     zero: float = 0.0
+    downwards: frozenset[str] = frozenset()
     known: tuple[Any, ...] = field(default=(), repr=False)
+    turned: frozenset[str] = field(default=frozenset(), repr=False)
+
+    def sign(self, role: str) -> int:
+        """What the signal of a role is times, to be as it was logged: 1 or −1."""
+        return -1 if role in self.turned else 1
 
     @property
     def integrator(self) -> str | None:

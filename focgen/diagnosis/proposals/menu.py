@@ -23,13 +23,15 @@ _SHORTEST = 1.5  # response times: a level held for less shows no level
 @dataclass(frozen=True, eq=False)
 class Choice:
     """One experiment: ``what`` to do, and the ``levels`` (n,) of −1 … 1 that the input of ``limits`` goes
-    through, at most ``share`` of the way to its ends; ``parts``: experiments of the menu in a row."""
+    through, at most ``share`` of the way to its ends; ``parts``: experiments of the menu in a row; ``sign``:
+    what the input is times, to be as the rig's logs have it."""
 
     what: str
     levels: np.ndarray
     limits: InputLimits
     share: float = 1.0
     parts: int = 1
+    sign: int = 1
 
     @property
     def input(self) -> np.ndarray:

@@ -24,6 +24,7 @@ from focgen.diagnosis.proposals.limits import Bounds, bounds_of, limits_of
 from focgen.diagnosis.proposals.menu import Choice, menu
 from focgen.diagnosis.proposals.separation import alone, in_session, without
 from focgen.logs.experiment import Experiment
+from focgen.present import present
 from focgen.rig.effects import library
 from focgen.rig.rig import Rig
 
@@ -52,8 +53,18 @@ def propose(
                 if len(rivals) > 1 and cause.rivals[0].effect == names[0]:
                     out = [r for r in cause.rivals if r.effect not in names]
                     asked = _Question(e, tuple(rivals[: 1 + _RIVALS]), tuple(out[:_RIVALS]))
-                    return _answered(rig, logs, explanations, asked)
+                    return _as_logged(rig, _answered(rig, logs, explanations, asked))
     return None
+
+
+def _as_logged(
+    rig: Rig, answer: tuple[NextExperiment, Choice] | None
+) -> tuple[NextExperiment, Choice] | None:
+    """An answer whose input has the sign that the rig's logs have."""
+    if answer is None:
+        return None
+    said, choice = answer
+    return said, replace(choice, sign=rig.sign(str(said.inputs["entry"])))
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +95,7 @@ class _Asked:
 
     def said(self, rig: Rig) -> str:
         """It in words, with the rig's units."""
-        limits, made, signals = self.choice.limits, self.choice.input, rig.signals
+        limits, made, signals = self.choice.limits, rig.sign(self.entry) * self.choice.input, rig.signals
         unit = signals.unit_of(self.entry)
         ends = f"from {made.min():.4g} to {made.max():.4g} {unit}".strip()
         parts = [f"{self.choice.what}, on the {self.entry} {ends}"]
@@ -93,7 +104,8 @@ class _Asked:
             parts.append(f"{faster} than {self.rate:.3g} {unit}/s")
         parts.append(f"{self.choice.seconds:.0f} s")
         if limits.integrates:
-            place = f"{self.bounds.stands:.3g} {signals.unit_of('output')}".strip()
+            stands = rig.sign("output") * present(self.bounds.stands)
+            place = f"{stands:.3g} {signals.unit_of('output')}".strip()
             left = self.bounds.left
             parts.append(f"from where it stands at {place}" if left else f"brought to {place} first")
         logged = f", with the {_ROLES[self.stage]} logged" if self.stage else ""
@@ -261,7 +273,7 @@ def _showing(
 def _proposed(
     rig: Rig, e: Explanation, rivals: Sequence[Rival], value: float, asked: _Asked
 ) -> NextExperiment:
-    names, made = [r.effect for r in rivals], asked.choice.input
+    names, made = [r.effect for r in rivals], rig.sign(asked.entry) * asked.choice.input
     return NextExperiment(
         f"telling {names[0]} from {' and '.join(names[1:])}{_lacking(e, names)}",
         asked.said(rig),

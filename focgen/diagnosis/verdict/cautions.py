@@ -133,6 +133,7 @@ def zeros_off(rig: Rig, refitted: Rig, explanations: Iterable[Explanation]) -> I
         if zero := e.zero:
             entry, exit = e.segment.entry, e.segment.exit
             by = f"{abs(zero):.3g} {rig.signals.unit_of(exit) or ''}".rstrip()
+            zero *= rig.sign(exit)
             by += " more" if zero > 0.0 else " less"
             mended = f"; if it is this gauge's, an offset of {-zero:.3g} in [signals] mends it"
             if exit == "output":

@@ -1,0 +1,138 @@
+"""Rigs whose signals go below 0, or against their inputs, run with the other sign.
+
+A ceiling, an obstacle or a valve that vents is written for signals that rise from 0, and friction for a gain
+above 0. A vacuum, a bend the other way and a drive mounted the other way round are the same rigs with another
+sign. So they are turned where a session comes in, until every stage has a gain above 0 and the input rises
+from 0, and what is found is turned back. The numbers of effects count as in the turned signals, and the rig's
+file says which these are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from focgen.arrays import Array
+from focgen.fractional.transfer import TransferFunction
+from focgen.logs.begin import Begin
+from focgen.logs.experiment import ROLES, Experiment
+from focgen.rig.rig import Actuator, LinearActuator, Ranges, Rig
+from focgen.rig.session import entry_of
+
+_DOWN = 4.0  # times as far below 0 as above: an input that goes both ways has no sign
+
+
+@dataclass(frozen=True)
+class Turn:
+    """The ``signs`` by role, 1 or −1, that the signals of a rig are run with."""
+
+    signs: Mapping[str, int]
+
+    @property
+    def roles(self) -> frozenset[str]:
+        """The roles that are run with the other sign."""
+        return frozenset(role for role, sign in self.signs.items() if sign < 0)
+
+    def rig(self, rig: Rig) -> Rig:
+        """The rig in the turned signals, or of one in these the rig as it was."""
+        u, p, k, y = (self.signs[role] for role in ("command", "pressure", "curvature", "output"))
+        ends = {"command": u, "pressure": p, "output": y}
+        spans = {role: _span(span, ends[role]) for role, span in rig.ranges.stated().items()}
+        return replace(
+            rig,
+            regulator=_times(rig.regulator, u * p),
+            actuator=_turned(rig.actuator, p, k),
+            sensor=_times(rig.sensor, k * y),
+            zero=y * rig.zero or 0.0,
+            ranges=replace(Ranges(), **spans),
+            effects=tuple(_learned(table, y) for table in rig.effects),
+            downwards=rig.turned,
+            turned=rig.downwards,
+        )
+
+    def signals(self, signals: Mapping[str, Array]) -> dict[str, Array]:
+        """Signals by role, turned; others as they are."""
+        return {role: -x if self.signs.get(role, 1) < 0 else x for role, x in signals.items()}
+
+    def log(self, log: Experiment, rig: Rig) -> Experiment:
+        """An experiment with ``rig``, turned; what is told of its begin, too."""
+        begins = {role: _began(begin, self.signs.get(role, 1)) for role, begin in log.begins.items()}
+        rows = None if log.rows is None else self.signals(log.rows)
+        stands = self.signs["pressure" if rig.integrator == "regulator" else "curvature"] * log.stands
+        return replace(log, signals=self.signals(log.signals), rows=rows, begins=begins, stands=stands or 0.0)
+
+
+def turn_of(rig: Rig) -> Turn:
+    """What turns the signals that a rig says go downwards."""
+    return Turn({role: -1 if role in rig.downwards else 1 for role in ROLES})
+
+
+def with_its_way(rig: Rig, logs: Sequence[Experiment]) -> Rig:
+    """The rig, told which signals go downwards, by the logs and by the signs of its gains. One that has
+    effects says by itself how they count."""
+    entry = entry_of(logs)
+    if rig.effects or rig.downwards or any(entry not in log for log in logs):
+        return rig
+    low, high = (float(end([end(log[entry]) for log in logs])) for end in (np.min, np.max))
+    x = -1 if low < 0.0 and -low > _DOWN * high else 1
+    u = x if entry == "command" else x * _sign(rig.regulator)
+    p = u * _sign(rig.regulator)
+    k = p * _sign_of(rig, p, entry, max(-low, high))
+    y = k * _sign(rig.sensor)
+    signs = {"command": u, "pressure": p, "curvature": k, "output": y, "reference": y}
+    return replace(rig, downwards=Turn(signs).roles)
+
+
+def _sign(transfer: TransferFunction) -> int:
+    """The sign of what a stage does slowly: of its gain at rest, or where it integrates of its rate."""
+    slowest = [min(terms, key=lambda term: term.order) for terms in (transfer.num, transfer.den)]
+    return 1 if slowest[0].coefficient * slowest[1].coefficient >= 0.0 else -1
+
+
+def _sign_of(rig: Rig, p: int, entry: str, most: float) -> int:
+    """The sign of an actuator's gain at the largest pressure, of the sign ``p``, that an ``entry`` of at most
+    that magnitude makes."""
+    actuator, most = rig.actuator, most or 1.0
+    if actuator is None:
+        return 1
+    if isinstance(actuator, LinearActuator):
+        return _sign(actuator.dynamics)
+    gain = abs(rig.regulator.dc_gain) if entry == "command" else 1.0
+    largest = p * most * gain if np.isfinite(gain) else p * max(map(abs, rig.ranges.pressure or (most,)))
+    return -1 if p * float(actuator.drive(largest)) < 0.0 else 1
+
+
+def _turned(actuator: Actuator | LinearActuator | None, p: int, k: int) -> Actuator | LinearActuator | None:
+    if actuator is None:
+        return None
+    offset = k * actuator.offset or 0.0
+    if isinstance(actuator, LinearActuator):
+        dynamics = _times(actuator.dynamics, p * k)
+        return replace(actuator, dynamics=dynamics, offset=offset, bias=p * actuator.bias or 0.0)
+    gain = tuple(k * p ** (i + 1) * g for i, g in enumerate(actuator.gain))
+    return replace(actuator, gain=gain, offset=offset)
+
+
+def _times(transfer: TransferFunction, sign: int) -> TransferFunction:
+    if sign > 0:
+        return transfer
+    return transfer * -1.0
+
+
+def _span(span: tuple[float, float], sign: int) -> tuple[float, float]:
+    return span if sign > 0 else (0.0 - span[1], 0.0 - span[0])
+
+
+def _learned(table: Mapping[str, Any], sign: int) -> Mapping[str, Any]:
+    """An effect's table with the outputs at which it was learned turned."""
+    if sign > 0 or "learned" not in table:
+        return table
+    low, high = table["learned"]
+    return {**table, "learned": [0.0 - high, 0.0 - low]}
+
+
+def _began(begin: Begin, sign: int) -> Begin:
+    return begin if sign > 0 else replace(begin, levels=tuple(0.0 - level for level in begin.levels))

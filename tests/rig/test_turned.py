@@ -1,0 +1,159 @@
+"""Rigs whose signals go below 0, or against their inputs.
+
+Red when turning a rig changes what it does, when it is not turned back to itself, when a rig is turned by a
+gain that it has nowhere in its logs, or when an effect in a rig that works downwards acts where nothing is.
+"""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+
+import focgen
+from focgen.errors import RigError
+from focgen.fractional.transfer import TransferFunction
+from focgen.logs.begin import Begin
+from focgen.logs.experiment import ROLES, Experiment
+from focgen.rig.replay import simulate_session
+from focgen.rig.rig import Actuator, Delays, LinearActuator, Ranges, Rig, Signals
+from focgen.rig.turned import Turn, turn_of, with_its_way
+
+H, SIGNALS = 0.05, Signals("t", "y", "u", "p", "k")
+ACTUATORS = [
+    Actuator(1.3, 0.6, (0.4, -0.1, 0.05), offset=0.2),
+    LinearActuator(TransferFunction([(3.0, 0.0)], [(0.2, 2.0), (0.5, 1.0), (1.0, 0.0)]), 0.3, 0.1),
+]
+
+
+def lag(gain, time):
+    return TransferFunction([(gain, 0.0)], [(time, 1.0), (1.0, 0.0)])
+
+
+def rig_of(actuator):
+    ranges = Ranges((0.0, 2.0), (-0.1, 1.0), (-1.0, 4.0))
+    return Rig(
+        "r", H, SIGNALS, actuator, lag(0.6, 0.1), lag(2.0, 0.2), ranges, (), Delays(0.0, 0.1), zero=0.05
+    )
+
+
+def logged(seed=1, **begins):
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.uniform(0.0, 2.0, 8), 40)
+    signals = {role: rng.normal(size=len(u)) for role in ROLES} | {"command": u}
+    return Experiment("e", H, signals, begins=begins)
+
+
+@pytest.mark.parametrize("actuator", ACTUATORS)
+@pytest.mark.parametrize("signs", list(product((1, -1), repeat=4)))
+def test_a_turned_rig_makes_the_turned_signals_and_turns_back(actuator, signs):
+    turn = Turn(dict(zip(ROLES, (*signs, signs[-1]))))
+    rig, log = replace(rig_of(actuator), downwards=turn.roles), logged(command=Begin((0.4,)))
+    other, turned = turn.rig(rig), turn.log(log, rig)
+    assert turn.rig(other) == rig and other.turned == turn.roles
+    for role, values in turn.log(turned, rig).signals.items():
+        np.testing.assert_array_equal(values, log[role])
+    made, mirrored = simulate_session(rig, [log])[0], simulate_session(other, [turned])[0]
+    for role, values in turn.signals(made).items():
+        np.testing.assert_allclose(mirrored[role], values, rtol=1e-9, atol=1e-12)
+
+
+def test_an_effect_s_outputs_are_turned_with_it():
+    rig = replace(rig_of(ACTUATORS[0]), effects=({"name": "creep", "learned": [-0.5, 2.0]},))
+    turn = Turn(dict.fromkeys(ROLES, 1) | {"output": -1})
+    assert turn.rig(rig).effects[0]["learned"] == [-2.0, 0.5]
+    assert turn.rig(turn.rig(rig)).effects == rig.effects
+
+
+U = np.r_[0.0, 1.0, 0.3, 2.0, 0.0]
+LOGS = {"up": U, "down": -U, "either": U - 1.0, "a little below": U - 0.2, "rests at 0": 0.0 * U}
+
+
+def logs_of(u):
+    return [Experiment("e", H, {"command": u, "output": np.zeros(len(u))})]
+
+
+@pytest.mark.parametrize(
+    "u, downwards",
+    [
+        ("up", []),
+        ("down", [*ROLES]),
+        ("either", []),
+        ("a little below", []),
+        ("rests at 0", []),
+    ],
+)
+def test_an_input_that_works_from_0_down_turns_all(u, downwards):
+    assert with_its_way(rig_of(ACTUATORS[1]), logs_of(LOGS[u])).downwards == frozenset(downwards)
+
+
+@pytest.mark.parametrize("u", ["up", "either"])
+def test_a_gain_below_0_turns_what_is_behind_it(u):
+    rig = rig_of(ACTUATORS[1])
+    turned = {
+        "regulator": replace(rig, regulator=rig.regulator * -1.0),
+        "actuator": replace(rig, actuator=replace(rig.actuator, dynamics=rig.actuator.dynamics * -1.0)),
+        "sensor": replace(rig, sensor=rig.sensor * -1.0),
+    }
+    found = {stage: with_its_way(one, logs_of(LOGS[u])).downwards for stage, one in turned.items()}
+    assert found["regulator"] == {"pressure", "curvature", "output", "reference"}
+    assert found["actuator"] == {"curvature", "output", "reference"}
+    assert found["sensor"] == {"output", "reference"}
+
+
+def test_an_axis_is_turned_by_its_rate():
+    axis = LinearActuator(TransferFunction([(-2.0, 0.0)], [(0.1, 2.0), (1.0, 1.0)]))
+    rig = Rig("axis", H, Signals("t", "y", "u"), axis)
+    assert with_its_way(rig, logs_of(LOGS["either"])).downwards == {"curvature", "output", "reference"}
+
+
+@pytest.mark.parametrize("gain, down", [((-0.05, 0.4), False), ((0.05, -0.4), True), ((0.0, 0.3), False)])
+def test_the_gain_counts_where_the_logs_are(gain, down):
+    rig = replace(rig_of(Actuator(1.3, 0.6, gain)), ranges=Ranges())
+    assert ("output" in with_its_way(rig, logs_of(LOGS["up"])).downwards) == down
+
+
+def test_a_rig_with_effects_says_by_itself_how_they_count():
+    rig = replace(rig_of(ACTUATORS[1]), effects=({"name": "contact", "form": "stop", "place": 0.5},))
+    assert with_its_way(rig, logs_of(LOGS["down"])) is rig
+    stated = replace(rig_of(ACTUATORS[1]), downwards=frozenset({"output"}))
+    assert with_its_way(stated, logs_of(LOGS["down"])) is stated
+
+
+def ceiling(**more):
+    table = {"name": "supply_saturation", "form": "hard", "stage": "regulator", "ceiling": 0.6}
+    return replace(rig_of(LinearActuator(lag(2.0, 0.3))), ranges=Ranges(), effects=(table,), **more)
+
+
+def test_a_ceiling_downwards_is_a_floor():
+    log = logged()
+    down = Turn(dict.fromkeys(ROLES, -1)).log(log, rig_of(ACTUATORS[1]))
+    up = focgen.replay(ceiling(), [log]).simulated["e"]
+    found = focgen.replay(ceiling(downwards=frozenset(ROLES)), [down])
+    assert np.max(up["pressure"]) == pytest.approx(0.6)
+    for role, values in up.items():
+        zero = 0.1 if role == "output" else 0.0  # the sensor's own is not turned: 0.05 there and back
+        np.testing.assert_allclose(found.simulated["e"][role], zero - values, atol=1e-9)
+    assert found.rig.downwards == frozenset(ROLES)
+    np.testing.assert_array_equal(found.experiments[0]["command"], down["command"])
+    assert np.min(focgen.replay(ceiling(), [down]).simulated["e"]["pressure"]) < -1.0
+
+
+def test_the_file_says_which_go_downwards(tmp_path):
+    rig = ceiling(downwards=frozenset({"pressure", "output"}))
+    focgen.write_rig(rig, tmp_path / "rig.toml")
+    assert 'downwards = ["pressure", "output"]' in (tmp_path / "rig.toml").read_text()
+    assert focgen.read_rig(tmp_path / "rig.toml") == rig
+
+
+@pytest.mark.parametrize("said", ['"output"', "true", '["outputs"]', "[1]"])
+def test_a_file_that_says_something_else_is_refused(tmp_path, said):
+    focgen.write_rig(ceiling(), tmp_path / "rig.toml")
+    text = (tmp_path / "rig.toml").read_text().replace("[signals]\n", f"[signals]\ndownwards = {said}\n")
+    (tmp_path / "rig.toml").write_text(text)
+    with pytest.raises(RigError, match="downwards"):
+        focgen.read_rig(tmp_path / "rig.toml")
+
+
+def test_nothing_is_turned_where_nothing_is_said():
+    assert not turn_of(rig_of(ACTUATORS[0])).roles
