@@ -79,6 +79,11 @@ class Actuator:
             made = (made + coefficient) * pressure
         return made[()]
 
+    def T_at(self, alpha: float) -> float:
+        """The T, in s^alpha, that has the same time constant T^(1/alpha), s, at another order."""
+        made: float = self.T ** (alpha / self.alpha)
+        return made
+
     @property
     def slip(self) -> str:
         """What a ``gain`` whose first coefficient is 0 comes to, which is seldom meant; "" for any other."""

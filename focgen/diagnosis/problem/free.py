@@ -19,7 +19,8 @@ _USUAL = 0.2  # relative deviation of nominal parameters from those given that s
 @dataclass(frozen=True)
 class Free:
     """Turns T, alpha, gain or num and den, and the offset, of ``stage`` into a vector and back; levels are
-    the segment's largest magnitudes."""
+    the segment's largest magnitudes. Of T in s^alpha no per cent can be told while alpha moves: it counts in
+    the actuator's own time constant, so that nothing depends on the unit of time."""
 
     rig: Rig
     stage: str
@@ -147,9 +148,8 @@ class Free:
         a, v = self.rig.actuator, [float(value) for value in vector]
         if isinstance(a, Actuator):
             gains = tuple(g * self.level_out / self.level_in ** (i + 1) for i, g in enumerate(v[2:-1]))
-            moved: Actuator | LinearActuator = Actuator(
-                float(np.exp(v[0])), v[1], gains, v[-1] * self.level_out
-            )
+            T = float(np.exp(v[0] - np.log(a.T))) * a.T_at(v[1])
+            moved: Actuator | LinearActuator = Actuator(T, v[1], gains, v[-1] * self.level_out)
         else:
             linear = present(a)
             bias = v[-2] * self.level_in if linear.integrates else linear.bias

@@ -53,7 +53,7 @@ def _moves(given: Rig, refitted: Rig) -> Iterator[tuple[str, str, float, float]]
         yield stage, "damping", damping - 1.0, known.time
     before, after = given.actuator, refitted.actuator
     if isinstance(before, Actuator) and isinstance(after, Actuator):
-        yield "actuator", "T", after.T / before.T - 1.0, given.uncertainty.actuator.time
+        yield "actuator", "T", after.T / before.T_at(after.alpha) - 1.0, given.uncertainty.actuator.time
         yield "actuator", "alpha", after.alpha / before.alpha - 1.0, given.uncertainty.actuator.alpha
         if len(before.gain) == 1 and before.gain[0]:
             yield "actuator", "gain", after.gain[0] / before.gain[0] - 1.0, given.uncertainty.actuator.gain
