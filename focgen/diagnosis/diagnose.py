@@ -34,7 +34,8 @@ from focgen.replaced import check_own
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.initial import in_windows
 from focgen.rig.plausibility import doubts
-from focgen.rig.replay import after_session, experiments, held_by_a_controller, with_known
+from focgen.rig.replay import after_session, experiments, with_known
+from focgen.rig.response import with_loops
 from focgen.rig.rig import Rig
 from focgen.rig.turned import turn_of, with_its_way
 
@@ -81,7 +82,10 @@ def diagnose(
     if turn.roles:
         session, nominal = tuple(turn.log(log, nominal) for log in session), turn.rig(nominal)
     diagnosis, asked = _diagnosed(nominal, session, ran, only, bootstrap)
-    diagnosis = turned_back(diagnosis, turn) if turn.roles else diagnosis
+    if turn.roles:
+        logged = tuple(turn.log(log, nominal) for log in session)
+        said = doubts(replace(turn.rig(nominal), known=()), logged)
+        diagnosis = replace(turned_back(diagnosis, turn), warnings=said)
     if out is not None:
         from focgen.diagnosis.write import write
 
@@ -99,7 +103,7 @@ def _diagnosed(
     """The diagnosis of a session whose signals rise from 0, and the experiment to make next, None where there
     is none; ``ran``: what the session says of its controller."""
     nominal, session = decimated(nominal, session)
-    nominal, session = held_by_a_controller(nominal, session), tuple(map(told_of_its_loop, session))
+    session = tuple(told_of_its_loop(log) for log in with_loops(nominal, session))
     session = with_readings(session)
     session = begun_session(nominal, session)
     logged, found = session, found_in(nominal, session, only, bootstrap)

@@ -5,11 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 from focgen.diagnosis.drawn import Drawn, Mean, Residual, Trace
-from focgen.diagnosis.model import Diagnosis
+from focgen.diagnosis.model import Candidate, Diagnosis, Found
+from focgen.logs.experiment import ROLES
+from focgen.logs.notes import listed
+from focgen.rig.effects import Form, library
+from focgen.rig.placed import EARLY, slot_in
+from focgen.rig.rig import Rig
+from focgen.rig.stages import ENTERS, LEAVES
 from focgen.rig.turned import Turn
 
 _WAYS = {"rising": "falling", "falling": "rising"}
-_COUNTED = "the {} below 0, or against the input: sizes of effects count magnitudes there"
+_COUNTED = "the {} below 0, or against the input: ceilings, widths and places count magnitudes there"
 
 
 def turned_back(diagnosis: Diagnosis, turn: Turn) -> Diagnosis:
@@ -18,17 +24,52 @@ def turned_back(diagnosis: Diagnosis, turn: Turn) -> Diagnosis:
     refitted, augmented, drawn = diagnosis.refitted, diagnosis.augmented, diagnosis.drawn
     return replace(
         diagnosis,
-        refitted=None if refitted is None else turn.rig(refitted),
-        augmented=None if augmented is None else turn.rig(augmented),
+        causes=tuple(_signed(found, turn) for found in diagnosis.causes),
+        refitted=None if refitted is None else _rig(refitted, turn),
+        augmented=None if augmented is None else _rig(augmented, turn),
         drawn=None if drawn is None else _drawn(drawn, turn),
-        notes=(*diagnosis.notes, *([_said(turn)] if diagnosis.causes else [])),
+        notes=(*diagnosis.notes, *_said(diagnosis, turn)),
     )
 
 
-def _said(turn: Turn) -> str:
-    roles = [r for r in ("command", "pressure", "curvature", "output") if r in turn.roles]
-    goes = f"{' and '.join([', '.join(roles[:-1]), roles[-1]] if len(roles) > 1 else roles)}"
-    return _COUNTED.format(f"{goes} {'go' if len(roles) > 1 else 'goes'}")
+def _rig(rig: Rig, turn: Turn) -> Rig:
+    """A rig in the signals as logged, which says how effects count where it has any."""
+    back = turn.rig(rig)
+    return back if back.effects else replace(back, downwards=frozenset())
+
+
+def _signed(found: Found, turn: Turn) -> Found:
+    """A cause whose numbers that may have either sign, and are in a signal's unit, have that of the log."""
+    return replace(found, candidates=tuple(_candidate(c, turn) for c in found.candidates))
+
+
+def _candidate(candidate: Candidate, turn: Turn) -> Candidate:
+    family = library().get(candidate.effect)
+    form = next((f for f in family.forms if f.name == candidate.form), None) if family else None
+    if form is None or turn.signs[_role(form, candidate.stage)] > 0:
+        return candidate
+    either = {p.name for p in form.parameters if p.level == 1 and p.lower < 0.0}
+    changed = {
+        name: replace(e, value=-e.value, ci95=(-e.ci95[1], -e.ci95[0])) if name in either else e
+        for name, e in candidate.parameters.items()
+    }
+    return replace(candidate, parameters=changed)
+
+
+def _role(form: Form, stage: str) -> str:
+    """The role of the signal that a form acts on in its stage: what enters it, or what leaves it."""
+    enters = {stage: role for role, stage in ENTERS.items()}
+    return enters[stage] if slot_in(form, stage) in EARLY else LEAVES[stage]
+
+
+def _said(diagnosis: Diagnosis, turn: Turn) -> list[str]:
+    """How effects count, where there are any, with the logged signals that go downwards."""
+    refitted = diagnosis.refitted
+    logged = {} if refitted is None else refitted.signals.columns()
+    roles = [role for role in ROLES if role in turn.roles and role in logged and role != "reference"]
+    if not diagnosis.causes or not roles:
+        return []
+    return [_COUNTED.format(f"{listed(roles)} {'go' if len(roles) > 1 else 'goes'}")]
 
 
 def _drawn(drawn: Drawn, turn: Turn) -> Drawn:

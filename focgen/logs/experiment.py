@@ -28,7 +28,8 @@ class Experiment:
     ahead of it the log's clock fell back. ``paused``: how long the rig rested before it is not known, and
     ``start`` is as if no time had passed. ``lasts``: a loop or a play lies where the experiment before left
     it, and not at 0. ``stands``: where a stage that integrates stood as it began, in its output's unit.
-    ``readings``: by role, the rows that hold one, where a logger filled in the others.
+    ``open_loop``: no controller is to be looked for. ``readings``: by role, the rows that hold one, where a
+    logger filled in the others.
     """
 
     name: str
@@ -43,6 +44,7 @@ class Experiment:
     anew: bool = False
     paused: bool = False
     lasts: bool = False
+    open_loop: bool = False
     stands: float = 0.0
     readings: Mapping[str, Ints] = field(default_factory=dict)
 

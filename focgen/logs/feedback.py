@@ -65,7 +65,7 @@ def told_of_its_loop(log: Experiment) -> Experiment:
 def _answer(log: Experiment) -> tuple[float, int]:
     """By how much the command falls where a reading is one higher, and how many samples later; 0 and 0 where
     no loop shows."""
-    if "command" not in log or "output" not in log or len(log) < _FEWEST:
+    if log.open_loop or "command" not in log or "output" not in log or len(log) < _FEWEST:
         return 0.0, 0
     return _told(*(np.asarray(log[role], float).tobytes() for role in ("command", "output")))
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from numbers import Real
+from typing import Literal
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from focgen.errors import LogError
 from focgen.logs.experiment import ROLES, Experiment
 from focgen.logs.table import LARGEST
 
+_CASTS: dict[bool, Literal["unsafe", "same_kind"]] = {True: "unsafe", False: "same_kind"}
 _MAY_LACK = "reference"  # the role that may have gaps
 _REMEDY = "give Experiment(name, sample_time, {role: array of shape (n,)})"
 
@@ -45,7 +47,8 @@ def _signal(where: str, role: str, values: object) -> Array:
         raise LogError(where, f"has a signal {role!r}", f"roles are {', '.join(ROLES)}")
     try:
         real = np.asarray(values)
-        made: Array = real if real.dtype == float else real.astype(float, casting="safe")
+        plain = real.dtype == object and all(isinstance(x, Real) for x in real.flat)
+        made: Array = real if real.dtype == float else real.astype(float, casting=_CASTS[plain])
     except (TypeError, ValueError):
         raise LogError(f"{where} {role}", "is not a series of real numbers", _REMEDY) from None
     if made.ndim != 1:

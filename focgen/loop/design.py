@@ -364,12 +364,13 @@ def _point(at: Equilibrium, tuned: Tuned, controller: Controller, step: Steps) -
 
 def _remarks(bench: Bench, points: tuple[OperatingPoint, ...]) -> list[str]:
     span = bench.rig.ranges.pressure
-    high = max(point.peak_pressure for point in points)
-    if span is None or high <= span[1]:
+    high = max((point.peak_pressure for point in points), key=abs)
+    if span is None or span[0] <= high <= span[1]:
         return []
+    end = span[1] if high > span[1] else span[0]
     return [
         (
-            f"on the way the pressure reaches {high:.3g}, beyond the rig's range ({span[1]:g}): the model is "
+            f"on the way the pressure reaches {high:.3g}, beyond the rig's range ({end:g}): the model is "
             "extrapolated there"
         )
     ]

@@ -20,7 +20,7 @@ from focgen.arrays import Array
 from focgen.control.equilibrium import Equilibrium, actuator_of
 from focgen.fractional.transfer import TransferFunction
 from focgen.loop.chain import substeps
-from focgen.loop.run import LoopRun
+from focgen.loop.run import LoopRun, farthest
 from focgen.loop.stepper import Stepper
 from focgen.rig.effects import Run
 from focgen.rig.engine import Chain
@@ -98,7 +98,8 @@ def run_with_effects(
     loop = _Loop(plant, stepper, reference, start, delay, pressure_known)
     seen = loop.run()
     sampled = {name: values[: -plant.parts : plant.parts] for name, values in seen.items()}
-    peak = np.maximum(seen["pressure"].max(axis=0), start.pressure)
+    begun = np.full((1, seen["pressure"].shape[1]), start.pressure)
+    peak = farthest(np.vstack([begun, seen["pressure"]]))
     return LoopRun(plant.sample_time, reference, loop.command, **sampled, peak_pressure=peak)
 
 

@@ -20,8 +20,8 @@ from focgen.loop.stepper import Stepper
 class LoopRun:
     """Signals at the controller's samples, each of shape (n, columns); sample k is at k · ``sample_time`` s.
 
-    ``command`` is what acts from that sample on. ``peak_pressure`` (columns,) is the largest over the
-    whole run, between samples too. ``curvature`` is None where it was not asked for.
+    ``command`` is what acts from that sample on. ``peak_pressure`` (columns,) is that farthest from 0 over
+    the whole run, between samples too. ``curvature`` is None where it was not asked for.
     """
 
     sample_time: float
@@ -57,6 +57,13 @@ def run_loop(
     return loop.run(stepper, reference, curvature)
 
 
+def farthest(pressure: Array) -> Array:
+    """Of pressures (n, columns) those farthest from 0 (columns,): a vacuum's peak is its lowest."""
+    high, low = pressure.max(axis=0), pressure.min(axis=0)
+    found: Array = np.where(high >= -low, high, low)
+    return found
+
+
 class _Loop:
     def __init__(
         self, chain: Chain, columns: int, samples: int, start: Equilibrium, delay: int, known: bool
@@ -90,7 +97,7 @@ class _Loop:
     def _advance(self, k: int, command: Array) -> tuple[Array, Array]:
         """Hold ``command`` over sample k; return pressure and output at its end."""
         pressure = self.start.pressure + self.regulator.step(command[None] - self.start.command)
-        self.peak = np.maximum(self.peak, pressure.max(axis=0))
+        self.peak = farthest(np.vstack([self.peak[None], pressure]))
         inside = pressure[: self.chain.substeps + 1]  # the last row may be one of what is measured, late
         self.drive[k] = self.actuator.drive(inside) - self.rest_drive
         return pressure[-1], self.start.output + self.plant.step(self.drive[k])[0]

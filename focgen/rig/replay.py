@@ -82,7 +82,8 @@ def replay(rig: RigLike, logs: Logs, from_: float | None = None, to: float | Non
             turn.rig(present(turned.rig)),
             tuple(turn.log(log, given) for log in turned.experiments),
         )
-        return replace(turned, simulated=back, rig=rig, experiments=session)
+        said = doubts(rig, session)
+        return replace(turned, simulated=back, rig=rig, experiments=session, warnings=said)
     return _replayed(given, session)
 
 
@@ -150,10 +151,15 @@ def simulate_session(
 
 
 def held_by_a_controller(rig: Rig, logs: Sequence[Experiment]) -> Rig:
-    """The rig with its command held between samples, where it does not say what that does and a log shows a
-    controller: what is made of a reading cannot have moved there ahead of it."""
-    made = rig.between is None and any(answers_reading(log) for log in logs)
-    return replace(rig, between=Between.HELD) if made else rig
+    """The rig with its command held between samples, where it does not say what that does, a log shows a
+    controller and no other way leaves far less: what is made of a reading cannot have moved there ahead of
+    it."""
+    commanded = entry_of(logs) == "command" and all("command" in log and "output" in log for log in logs)
+    if rig.between is not None or not commanded or not any(answers_reading(log) for log in logs):
+        return rig
+    held, *others = (replace(rig, between=way) for way in (Between.HELD, Between.STRAIGHT, Between.SMOOTH))
+    contradicted = min(_left(other, logs) for other in others) < _HELD * _left(held, logs)
+    return rig if contradicted else held
 
 
 def told_between(rig: Rig, logs: Sequence[Experiment]) -> Rig:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -32,6 +33,17 @@ def response_time(rig: Rig, h: float, record: float) -> float:
     y = np.diff(y, count) if count >= 0 else _summed(y, -count)
     passed = np.abs(y) >= 0.63 * abs(y[-1])
     return float(np.clip(span * max(int(np.argmax(passed)), 1), 3 * h, record / 3))
+
+
+def with_loops(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
+    """The logs of a rig of gains above 0, open where a command that answers a reading would show no
+    controller: of a rig that answers at once against what it comes to, or comes to nothing, the reading
+    answers the command like that."""
+    run = Run.of([3], [0.0], logs[0].sample_time)
+    y = Chain(rig).run(np.r_[0.0, 1.0, 1.0], "regulator", "sensor", run)
+    if _integrations(rig) >= 0 and y[2] >= y[0]:
+        return tuple(logs)
+    return tuple(replace(log, open_loop=True) for log in logs)
 
 
 def integrations(rig: Rig) -> int:

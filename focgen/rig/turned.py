@@ -22,7 +22,7 @@ from focgen.logs.experiment import ROLES, Experiment
 from focgen.rig.rig import Actuator, LinearActuator, Ranges, Rig
 from focgen.rig.session import entry_of
 
-_DOWN = 4.0  # times as far below 0 as above: an input that goes both ways has no sign
+_DOWN = 4.0  # times as much below 0 as above, over the session: an input that goes both ways has no sign
 
 
 @dataclass(frozen=True)
@@ -72,15 +72,16 @@ def turn_of(rig: Rig) -> Turn:
 
 def with_its_way(rig: Rig, logs: Sequence[Experiment]) -> Rig:
     """The rig, told which signals go downwards, by the logs and by the signs of its gains. One that has
-    effects says by itself how they count."""
+    effects says by itself how they count; what one without them says is of another session."""
     entry = entry_of(logs)
-    if rig.effects or rig.downwards or any(entry not in log for log in logs):
+    if rig.effects or any(entry not in log for log in logs):
         return rig
-    low, high = (float(end([end(log[entry]) for log in logs])) for end in (np.min, np.max))
-    x = -1 if low < 0.0 and -low > _DOWN * high else 1
+    values = np.concatenate([np.asarray(log[entry], float) for log in logs])
+    down, up = -float(values[values < 0.0].sum()), float(values[values > 0.0].sum())
+    x, most = (-1 if down > _DOWN * up else 1), float(np.max(np.abs(values)))
     u = x if entry == "command" else x * _sign(rig.regulator)
     p = u * _sign(rig.regulator)
-    k = p * _sign_of(rig, p, entry, max(-low, high))
+    k = p * _sign_of(rig, p, entry, most)
     y = k * _sign(rig.sensor)
     signs = {"command": u, "pressure": p, "curvature": k, "output": y, "reference": y}
     return replace(rig, downwards=Turn(signs).roles)

@@ -70,8 +70,7 @@ def test_a_leak_goes_on_beyond_the_largest_pressure_that_was_measured(share):
     bare = Rig("line", H, RIG.signals, RIG.actuator)
     made = Chain(bare, (_leaking(share),)).run(log["command"], "regulator", "regulator", run, True)
     assert np.all(np.diff(made) > -1e-12)
-    crest = 0.25 / share  # half of the scale over the share
-    part = log["command"] <= crest
+    part = log["command"] <= 0.25 / share  # up to the crest, half of the scale over the share
     x = log["command"][part]
     np.testing.assert_allclose(made[part], x * (1.0 - share * x / 0.5), atol=1e-12)
     np.testing.assert_allclose(made[~part], np.max(made), atol=1e-4)

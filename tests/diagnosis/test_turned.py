@@ -12,9 +12,10 @@ import pytest
 
 import focgen
 from focgen.diagnosis.diagnose import diagnose
+from focgen.diagnosis.proposals.identifiability import plan
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import ROLES, Experiment
-from focgen.rig.rig import LinearActuator, Rig, Signals
+from focgen.rig.rig import LinearActuator, Ranges, Rig, Signals
 from focgen.rig.turned import Turn
 
 H, FINER, COUNT = 0.02, 10, 900
@@ -135,3 +136,37 @@ def test_an_experiment_is_proposed_on_the_side_where_the_logs_are(tmp_path):
     rows = np.loadtxt(tmp_path / "vacuum" / other.inputs["file"], delimiter=",", skiprows=1)
     assert rows[:, 1].min() == pytest.approx(other.inputs["low"], rel=1e-5) and rows[:, 1].max() <= 0.0
     assert json.loads((tmp_path / "vacuum" / "diagnosis.json").read_text())["next_experiment"]
+
+
+def test_a_rig_refitted_in_a_vacuum_says_nothing_of_the_next_session():
+    rig, logs = finger(ceiling=0.6)
+    stale = replace(rig, downwards=frozenset(ROLES))
+    assert told(diagnose(stale, logs, pictures=False)) == told(diagnose(rig, logs, pictures=False))
+    down = diagnose(*turned(rig, logs, "vacuum"), pictures=False)
+    assert not down.refitted.downwards and down.augmented.downwards
+
+
+def test_a_drift_has_the_sign_that_the_log_shows():
+    rig, logs = finger()
+    sinking = [
+        replace(log, signals=log.signals | {"output": log["output"] + 0.005 * (log.start + log.time)})
+        for log in logs
+    ]
+    up, down = (
+        diagnose(*turned(rig, sinking, signs), pictures=False).causes[0].candidates[0]
+        for signs in ("vacuum", "other way")
+    )
+    rates = [c.parameters["rate"] for c in (up, down)]
+    assert up.effect == down.effect == "sensor_drift"
+    assert rates[0].value == pytest.approx(0.005, rel=0.2) and rates[1].value == -rates[0].value
+    assert rates[1].ci95 == (-rates[0].ci95[1], -rates[0].ci95[0])
+
+
+@pytest.mark.parametrize("signs", ["vacuum", "other way"])
+@pytest.mark.parametrize("logged", [False, True])
+def test_a_plan_has_no_sign(signs, logged):
+    rig, logs = finger()
+    rig = replace(rig, ranges=Ranges((0.0, 1.0), (0.0, 1.0), (0.0, 2.0)))
+    other, others = turned(rig, logs, signs)
+    asked, answered = plan(rig, logs if logged else ()), plan(other, others if logged else ())
+    assert asked == answered

@@ -116,8 +116,13 @@ def test_the_gain_counts_where_the_logs_are(gain, down):
 def test_a_rig_with_effects_says_by_itself_how_they_count():
     rig = replace(rig_of(ACTUATORS[1]), effects=({"name": "contact", "form": "stop", "place": 0.5},))
     assert with_its_way(rig, logs_of(LOGS["down"])) is rig
-    stated = replace(rig_of(ACTUATORS[1]), downwards=frozenset({"output"}))
-    assert with_its_way(stated, logs_of(LOGS["down"])) is stated
+    stated = replace(rig_of(ACTUATORS[1]), downwards=frozenset(ROLES))
+    assert not with_its_way(stated, logs_of(LOGS["up"])).downwards  # without effects it is another session's
+
+
+def test_a_purge_is_no_other_way():
+    purged = [*logs_of(np.tile(LOGS["down"], 20)), *logs_of(np.r_[0.0, 2.0, 0.0, 0.0, 0.0])]
+    assert with_its_way(rig_of(ACTUATORS[1]), purged).downwards == frozenset(ROLES)
 
 
 def ceiling(**more):
@@ -137,6 +142,17 @@ def test_a_ceiling_downwards_is_a_floor():
     assert found.rig.downwards == frozenset(ROLES)
     np.testing.assert_array_equal(found.experiments[0]["command"], down["command"])
     assert np.min(focgen.replay(ceiling(), [down]).simulated["e"]["pressure"]) < -1.0
+
+
+def test_what_is_said_of_a_log_is_said_in_its_own_signals():
+    """An output above 0, of a rig whose range is below, was said to be negative."""
+    ranges = Ranges((-2.0, 0.0), (-2.0, 0.0), (-4.0, 0.0))
+    log = logged()
+    u, up = -log["command"], replace(ceiling(downwards=frozenset(ROLES)), ranges=ranges)
+    made = focgen.replay(up, [replace(log, signals={"command": u, "output": u})]).simulated["e"]["output"]
+    wrong = replace(log, signals={"command": u, "output": -made})
+    bare = replace(up, effects=(), downwards=frozenset())
+    assert focgen.replay(up, [wrong]).warnings == focgen.replay(bare, [wrong]).warnings != ()
 
 
 def test_the_file_says_which_go_downwards(tmp_path):

@@ -62,12 +62,24 @@ def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
     problems = [problem_of(rig, segment.anew(between=way), logs) for way in tried]
     if len(problems) == 1:
         return problems[0]
-    *plain, last = [fit(p, p.nominal(), WHITE, 6) for p in problems]
+    fits = [fit(p, p.nominal(), WHITE, 6) for p in problems]
+    if segment.answers and (held := _kept_held(fits)):
+        return held.problem
+    *plain, last = fits
     closest = min(plain, key=lambda f: f.sse)
     enough = _SMOOTHER if tried[-1] == Between.SMOOTH else _by_chance(segment)
     if tried[-1] != Between.STRAIGHT and last.sse > enough * closest.sse:
         return closest.problem
     return min(closest, last, key=lambda f: f.sse).problem
+
+
+def _kept_held(fits: Sequence[Fit]) -> Fit | None:
+    """The fit to a held input, unless another leaves far less: what a controller makes of a reading cannot
+    have moved there ahead of it."""
+    held = next((f for f in fits if f.problem.segment.between == Between.HELD), None)
+    if held is None or min(f.sse for f in fits) < NUMBERS.unlikely * held.sse:
+        return None
+    return held
 
 
 def _by_chance(segment: Segment) -> float:

@@ -13,7 +13,7 @@ from focgen.arrays import Ints
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.logs.between import Between, white_level
 from focgen.logs.experiment import Experiment
-from focgen.logs.feedback import unlogged_reference
+from focgen.logs.feedback import answers_reading, unlogged_reference
 from focgen.logs.repeats import dead_band
 from focgen.rig import kernels
 from focgen.rig.effects import Run
@@ -42,7 +42,8 @@ class Segment:
     longer counts, of a rig that integrates; 0: none is forgotten. ``whole``: where a logger filled rows in,
     the segment at every row, at which its input comes; the one itself has the ``readings`` (n,) of it alone.
     ``band``: by how much the output has to change to be logged, in its unit, 0 where all of it is.
-    ``passed``: by role, logged signals (n,) that the output may take up at once, of order one.
+    ``passed``: by role, logged signals (n,) that the output may take up at once, of order one. ``answers``:
+    whether the input is a command that a controller made of the readings.
     """
 
     entry: str
@@ -66,6 +67,7 @@ class Segment:
     readings: Ints | None = None
     band: float = 0.0
     passed: Mapping[str, np.ndarray] = field(default_factory=dict)
+    answers: bool = False
 
     @property
     def fed(self) -> Segment:
@@ -238,6 +240,7 @@ def make(
         wanted=_asked(logs, x, closed, _as_input(hidden, entry, x)) if looped else np.zeros(0),
         band=dead_band(y),
         passed=_passed(logs, entry),
+        answers=entry == "command" and any(map(answers_reading, logs)),
     )
     rows = _readings(logs, exit)
     return whole if rows is None else whole.read_at(rows)

@@ -27,10 +27,12 @@ from focgen.rig.replay import experiments, with_known
 from focgen.rig.response import check_bounded, integrations, longest, response_time
 from focgen.rig.rig import Rig
 from focgen.rig.stages import LEAVES
+from focgen.rig.turned import turn_of, with_its_way
 
 ALIKE = 0.9  # cosine beyond which two effects cannot be told apart
 HIDDEN = 0.1  # surviving share below which an effect hides in the nominal parameters
 _FINE, _LONGEST = 200, 600.0  # samples of a response time, and response times of an experiment of the menu
+_COMMAND = (0.0, 10.0)  # where the rig file is silent
 
 
 @dataclass(frozen=True)
@@ -71,12 +73,22 @@ def plan(rig: RigLike, logs: Logs = ()) -> Plan:
     Only the inputs of the logs are used. Raises RigError and LogError for files that cannot be used.
     """
     nominal, each = with_known(rig_of(rig)), each_of(logs)
-    session = experiments(nominal, each) if each else _menu(nominal)
+    logged = experiments(nominal, each) if each else ()
+    nominal = with_its_way(nominal, logged or _reach(nominal))
+    turn = turn_of(nominal)
+    nominal, logged = turn.rig(nominal), tuple(turn.log(log, nominal) for log in logged)
+    session = logged or _menu(nominal)
     roles = cuts(session)
     response = response_time(nominal, session[0].sample_time, longest(session))
     seen = excitation([s[roles[0]] for s in session], session[0].sample_time, response)
     found = [survival for a, b in pairwise(roles) for survival in _segment(nominal, session, a, b, seen)]
     return Plan(tuple(s.name for s in session), tuple(found))
+
+
+def _reach(rig: Rig) -> tuple[Experiment, ...]:
+    """The ends of the command, as a log that goes there."""
+    ends = np.asarray(rig.ranges.command or _COMMAND, float)
+    return (Experiment("ranges", rig.sample_time, {"command": ends}),)
 
 
 def _menu(rig: Rig) -> tuple[Experiment, ...]:
@@ -98,7 +110,7 @@ def _menu(rig: Rig) -> tuple[Experiment, ...]:
 
 def _limits(rig: Rig, response: float) -> InputLimits:
     """What the rig file says of the command: from 0 to 10 where it is silent."""
-    low, high = rig.ranges.command or (0.0, 10.0)
+    low, high = rig.ranges.command or _COMMAND
     h = max(rig.sample_time, response / _FINE)
     return InputLimits(
         low, high, min(max(0.0, low), high), np.inf, _LONGEST * response, response, h, 1, integrations(rig)

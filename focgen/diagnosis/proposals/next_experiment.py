@@ -95,7 +95,8 @@ class _Asked:
 
     def said(self, rig: Rig) -> str:
         """It in words, with the rig's units."""
-        limits, made, signals = self.choice.limits, rig.sign(self.entry) * self.choice.input, rig.signals
+        limits, signals = self.choice.limits, rig.signals
+        made = rig.sign(self.entry) * self.choice.input + 0.0  # no −0
         unit = signals.unit_of(self.entry)
         ends = f"from {made.min():.4g} to {made.max():.4g} {unit}".strip()
         parts = [f"{self.choice.what}, on the {self.entry} {ends}"]
@@ -273,7 +274,7 @@ def _showing(
 def _proposed(
     rig: Rig, e: Explanation, rivals: Sequence[Rival], value: float, asked: _Asked
 ) -> NextExperiment:
-    names, made = [r.effect for r in rivals], rig.sign(asked.entry) * asked.choice.input
+    names, made = [r.effect for r in rivals], rig.sign(asked.entry) * asked.choice.input + 0.0
     return NextExperiment(
         f"telling {names[0]} from {' and '.join(names[1:])}{_lacking(e, names)}",
         asked.said(rig),

@@ -16,8 +16,8 @@ def _turbulent(x: Array, values: Values, run: Run) -> Array:
 
 
 def _growing(x: Array, values: Values, run: Run) -> Array:
-    """A loss that grows with the square. What would be there without it goes beyond the ``scale``, the
-    largest that is measured behind it; beyond the crest nothing more comes through."""
+    """A loss that grows with the square of what would be there without it, which may go beyond the ``scale``,
+    the largest that was measured. Beyond the crest of that nothing more comes through."""
     share, scale = values
     size = np.minimum(np.abs(x) / scale, 0.5 / max(share, 1e-12))
     return np.sign(x) * scale * size * (1.0 - share * size)
