@@ -26,6 +26,8 @@ def checked_in_memory(log: Experiment) -> Experiment:
     where, h = str(log.name), log.sample_time
     if isinstance(h, bool) or not isinstance(h, Real) or not math.isfinite(h) or h <= 0.0:
         raise LogError(where, f"has the sample time {h!r}", "give seconds above 0")
+    if not isinstance(log.start, Real) or not abs(log.start) <= LARGEST:
+        raise LogError(where, f"has the start {log.start!r}", "give seconds on the session's clock")
     if not isinstance(log.signals, Mapping) or not log.signals:
         raise LogError(where, "has no signals", _REMEDY)
     signals = {role: _signal(where, role, values) for role, values in log.signals.items()}
@@ -49,6 +51,7 @@ def _signal(where: str, role: str, values: object) -> Array:
         real = np.asarray(values)
         plain = real.dtype == object and all(isinstance(x, Real) for x in real.flat)
         made: Array = real if real.dtype == float else real.astype(float, casting=_CASTS[plain])
+        made = np.where(np.ma.getmaskarray(values), np.nan, made) if np.ma.isMaskedArray(values) else made
     except (TypeError, ValueError):
         raise LogError(f"{where} {role}", "is not a series of real numbers", _REMEDY) from None
     if made.ndim != 1:

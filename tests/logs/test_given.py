@@ -37,6 +37,8 @@ BAD = {
     "is inf at sample 50": logged(command=with_at(50, np.inf)),
     "is 1e+200 at sample 3": logged(output=with_at(3, 1e200)),
     "has the sample time 0": logged(h=0),
+    "has the start nan": Experiment("e7", 0.02, {"command": U, "output": U}, start=float("nan")),
+    "output: has gaps, the first at sample 3": logged(output=np.ma.masked_inside(U + np.arange(300), 3, 4)),
     "has the sample time nan": logged(h=float("nan")),
     "has the sample time '0.02'": logged(h="0.02"),
     "has the sample time True": logged(h=True),
@@ -60,3 +62,5 @@ def test_lists_and_whole_numbers_will_do():
     np.testing.assert_array_equal(made["command"], U)
     np.testing.assert_array_equal(made["output"], 10.0 * U)
     assert made["output"].dtype == float
+    objects = checked_in_memory(logged(command=np.array(list(U), object)))
+    np.testing.assert_array_equal(objects["command"], U)
