@@ -55,7 +55,7 @@ CONSTANTS = {
     "proposals/menu.py": ["_SHORTEST"],
     "proposals/next_experiment.py": ["_CERTAIN", "_ENOUGH", "_MOST", "_SHARES", "_SURE"],
     "proposals/separation.py": ["_NOISIER"],
-    "proposals/identifiability.py": ["ALIKE", "HIDDEN", "_FINE", "_LONGEST"],
+    "proposals/identifiability.py": ["ALIKE", "HIDDEN", "_COMMAND", "_FINE", "_LONGEST"],
     "proposals/limits.py": ["_BELOW", "_BEYOND", "_JUMP", "_LEAST", "_LONGEST", "_MARGIN"],
     "verdict/clocks.py": ["_SETTLED"],
     "verdict/compose.py": ["_SHOWN"],
