@@ -218,7 +218,7 @@ def make(
     input_modes = np.zeros((len(x), 0)) if input_modes is None else input_modes
     names = tuple(log.name for log in logs)
     led = [exit == "output" and _is_led(log) for log in logs]
-    hidden = [_hidden(log) if exit == "output" else None for log in logs]
+    hidden = _as_input([_hidden(log) if exit == "output" else None for log in logs], entry, x)
     closed = [_is_closed(log) for log in logs]
     looped = any(closed) or any(made is not None for made in hidden)
     trust = np.concatenate([_trust(np.asarray(log[exit], float), _unsteadiness(log)) for log in logs])
@@ -232,12 +232,12 @@ def make(
         Between.HELD if entry == "command" else Between.STRAIGHT,
         names,
         trust,
-        _asked(logs, x, led, _as_input(hidden, entry, x)),
+        _asked(logs, x, led, hidden),
         any(led),
         looped,
         input_modes[:, _felt(input_modes, x, y)],
         np.zeros((len(x), 0)),
-        wanted=_asked(logs, x, closed, _as_input(hidden, entry, x)) if looped else np.zeros(0),
+        wanted=_asked(logs, x, closed, hidden) if looped else np.zeros(0),
         band=dead_band(y),
         passed=_passed(logs, entry),
         answers=entry == "command" and any(map(answers_reading, logs)),
