@@ -36,6 +36,7 @@ from focgen.rig.turned import turn_of
 from focgen.shown import Shown
 
 _CLOSER = 0.05  # of the mean square that the usual way of a command leaves: less, and another one is right
+_LEFT_OUT = "the command is left out, which other logs of the session lack: the pressure drives all of them"
 _HELD = 0.5  # the same of a pressure in lines that only jumps and rests: less, and it is held
 _BESIDES = ("name", "form", "stage", "clock", "carried", "promise", "learned")
 
@@ -128,7 +129,19 @@ def experiments(
     )
     check_moving(found)
     check_bounded(rig, longest(found))
-    return found
+    return _of_one_input(found)
+
+
+def _of_one_input(logs: tuple[Experiment, ...]) -> tuple[Experiment, ...]:
+    """The experiments without a command that other ones lack, where the pressure is in all of them."""
+    if all("command" in log for log in logs) or not all("pressure" in log for log in logs):
+        return logs
+    return tuple(_without_command(log) if "command" in log else log for log in logs)
+
+
+def _without_command(log: Experiment) -> Experiment:
+    kept = {role: values for role, values in log.signals.items() if role != "command"}
+    return replace(log, signals=kept, notes=(*log.notes, _LEFT_OUT))
 
 
 def simulate_session(

@@ -129,3 +129,18 @@ def test_a_pressure_that_stands_for_the_command_is_not_held():
     logs = session(0, ROLES[1])
     mixed = [logs[0], replace(logs[1], signals={r: logs[1][r] for r in ("pressure", "output")})]
     assert held_by_a_controller(rig_of(ROLES[1]), mixed).between is None
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_a_session_has_one_input(first):
+    """A log with a command ahead of one with the pressure alone ended in a fault."""
+    logs = session(0, ROLES[1])
+    bare = replace(logs[1], signals={r: logs[1][r] for r in ("pressure", "output")})
+    mixed = [bare, logs[0]] if first else [logs[0], bare]
+    found, replayed = (
+        diagnose(rig_of(ROLES[1]), mixed, pictures=False),
+        focgen.replay(rig_of(ROLES[1]), mixed),
+    )
+    assert found.verdict in ("none", "parameters")
+    for notes in (found.notes, replayed.notes):
+        assert sum("e0: the command is left out" in note for note in notes) == 1
