@@ -85,6 +85,17 @@ class Experiment:
         """The rows at which the signal of a role was read: all of them where nothing was filled in."""
         return self.readings.get(role, slice(None))
 
+    def without(self, role: str, note: str) -> Experiment:
+        """The experiment as if the signal of a role had not been logged, with a note on that."""
+        others = [r for r in self.signals if r != role]
+        return replace(
+            self,
+            signals={r: self.signals[r] for r in others},
+            readings={r: self.readings[r] for r in others if r in self.readings},
+            begins={r: self.begins[r] for r in others if r in self.begins},
+            notes=(*self.notes, note),
+        )
+
     @property
     def time(self) -> Array:
         """Seconds since the first sample, shape (n,)."""

@@ -79,12 +79,10 @@ def replay(rig: RigLike, logs: Logs, from_: float | None = None, to: float | Non
     if given.effects and turn.roles:
         turned = _replayed(turn.rig(given), [turn.log(log, given) for log in session])
         back = {name: turn.signals(made) for name, made in turned.simulated.items()}
-        rig, session = (
-            turn.rig(present(turned.rig)),
-            tuple(turn.log(log, given) for log in turned.experiments),
-        )
-        said = doubts(rig, session)
-        return replace(turned, simulated=back, rig=rig, experiments=session, warnings=said)
+        told = turn.rig(present(turned.rig))
+        session = tuple(turn.log(log, given) for log in turned.experiments)
+        said = doubts(told, session)
+        return replace(turned, simulated=back, rig=told, experiments=session, warnings=said)
     return _replayed(given, session)
 
 
@@ -136,12 +134,7 @@ def _of_one_input(logs: tuple[Experiment, ...]) -> tuple[Experiment, ...]:
     """The experiments without a command that other ones lack, where the pressure is in all of them."""
     if all("command" in log for log in logs) or not all("pressure" in log for log in logs):
         return logs
-    return tuple(_without_command(log) if "command" in log else log for log in logs)
-
-
-def _without_command(log: Experiment) -> Experiment:
-    kept = {role: values for role, values in log.signals.items() if role != "command"}
-    return replace(log, signals=kept, notes=(*log.notes, _LEFT_OUT))
+    return tuple(log.without("command", _LEFT_OUT) if "command" in log else log for log in logs)
 
 
 def simulate_session(

@@ -17,6 +17,7 @@ import numpy as np
 
 from focgen.arrays import Array
 from focgen.fractional.transfer import TransferFunction
+from focgen.jsontext import fits
 from focgen.logs.begin import Begin
 from focgen.logs.experiment import ROLES, Experiment
 from focgen.rig.rig import Actuator, LinearActuator, Ranges, Rig
@@ -38,6 +39,8 @@ class Turn:
 
     def rig(self, rig: Rig) -> Rig:
         """The rig in the turned signals, or of one in these the rig as it was."""
+        if not self.roles:
+            return rig
         u, p, k, y = (self.signs[role] for role in ("command", "pressure", "curvature", "output"))
         ends = {"command": u, "pressure": p, "output": y}
         spans = {role: _span(span, ends[role]) for role, span in rig.ranges.stated().items()}
@@ -128,11 +131,11 @@ def _span(span: tuple[float, float], sign: int) -> tuple[float, float]:
 
 
 def _learned(table: Mapping[str, Any], sign: int) -> Mapping[str, Any]:
-    """An effect's table with the outputs at which it was learned turned."""
-    if sign > 0 or "learned" not in table:
+    """An effect's table with the outputs at which it was learned turned, where it tells them."""
+    learned = table.get("learned")
+    if sign > 0 or not isinstance(learned, list) or not fits(learned, [float, float]):
         return table
-    low, high = table["learned"]
-    return {**table, "learned": [0.0 - high, 0.0 - low]}
+    return {**table, "learned": [0.0 - learned[1], 0.0 - learned[0]]}
 
 
 def _began(begin: Begin, sign: int) -> Begin:

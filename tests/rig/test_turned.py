@@ -65,6 +65,13 @@ def test_an_effect_s_outputs_are_turned_with_it():
     assert turn.rig(turn.rig(rig)).effects == rig.effects
 
 
+@pytest.mark.parametrize("learned", [3.0, [1.0], ["a", "b"], None])
+def test_a_learned_range_that_is_none_is_left_to_whoever_reads_it(learned):
+    rig = replace(ceiling(downwards=frozenset(ROLES)), ranges=Ranges())
+    rig = replace(rig, effects=({**rig.effects[0], "learned": learned},))
+    assert focgen.replay(rig, [logged()]).rig.effects == rig.effects
+
+
 U = np.r_[0.0, 1.0, 0.3, 2.0, 0.0]
 LOGS = {"up": U, "down": -U, "either": U - 1.0, "a little below": U - 0.2, "rests at 0": 0.0 * U}
 

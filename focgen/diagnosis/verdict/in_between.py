@@ -53,18 +53,7 @@ def tell_the_same(bare: Sequence[Explanation], found: Sequence[Explanation]) -> 
 def without(logs: Sequence[Experiment], role: str) -> tuple[Experiment, ...]:
     """The session as if a signal had not been logged, with a note on that."""
     note = f"the {role} is so noisy that it hides what the output shows: diagnosed without it"
-
-    def bare(log: Experiment) -> Experiment:
-        others = [r for r in log.signals if r != role]
-        return replace(
-            log,
-            signals={r: log.signals[r] for r in others},
-            readings={r: log.readings[r] for r in others if r in log.readings},
-            begins={r: log.begins[r] for r in others if r in log.begins},
-            notes=(*log.notes, note),
-        )
-
-    return tuple(bare(log) for log in logs)
+    return tuple(log.without(role, note) for log in logs)
 
 
 def with_signals(logs: Sequence[Experiment], of: Sequence[Experiment]) -> tuple[Experiment, ...]:
