@@ -8,6 +8,11 @@ import numpy as np
 import pytest
 
 from focgen.diagnosis.diagnose import diagnose
+from focgen.diagnosis.fitting.fit import WHITE, fit
+from focgen.diagnosis.hypotheses.nuisances import problem_of
+from focgen.diagnosis.hypotheses.order import in_their_order
+from focgen.diagnosis.problem.problem import CandidateEffect
+from focgen.diagnosis.problem.segments import make
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.effects import library
@@ -53,6 +58,27 @@ def test_a_leak_behind_a_slow_volume_is_named_with_it(seed):
     firsts = {cause.candidates[0].effect for cause in found.causes}
     assert firsts == {"leak", "slow_regulator"}
     assert found.gap.explained < 1.8 * found.gap.floor
+
+
+def test_a_leak_that_is_fitted_ahead_of_the_volume_is_passed_behind_it():
+    """Its last effect is the volume's: in the other order no slope leads to the noise."""
+    logs = session(0, 0.28)
+    leak, slow = (
+        CandidateEffect(*_form(*name), "regulator")
+        for name in (("leak", "growing"), ("slow_regulator", "partial"))
+    )
+    bare = problem_of(RIG, make(logs, "command", "pressure"), logs)
+    found = {}
+    for order in ((leak, slow), (slow, leak)):
+        problem = bare.with_candidates(order)
+        shares = {leak: (0.2, 1.0), slow: (0.6, 1.2)}
+        start = np.concatenate([bare.nominal(), *(shares[each] for each in order)])
+        of = fit(problem, start, WHITE, 30)
+        found[order] = of, in_their_order(of)
+    (wrong, mended), (right, kept) = found.values()
+    assert mended.problem.candidates == (slow, leak)
+    assert mended.sse < 0.5 * wrong.sse and mended.sse == pytest.approx(right.sse, rel=0.05)
+    assert kept is right
 
 
 def _leaking(share):
