@@ -214,10 +214,10 @@ def rubbed(force: np.ndarray, rub: float) -> np.ndarray:
     return np.array(found)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("seed", [3, 4])
+@pytest.mark.parametrize("seed", [4, *(pytest.param(s, marks=pytest.mark.long) for s in (3, 5, 6))])
 def test_steps_that_are_noise_hide_no_friction(seed):
-    """The friction moves the reading by half a step, of twice the noise. It was seen, and was unknown."""
+    """The friction moves the reading by half a step, of twice the noise. Noise of half a step blurs steps:
+    simulated without it they hid the friction, and a valve that sticks was named at 0.94."""
     rng, step = np.random.default_rng(seed), 0.1
     steps = np.r_[np.zeros(10), np.repeat((2.0, -2.0, 4.0, 0.0, -4.0, 1.0, -1.0, 3.0, 0.0), 60)]
     sine = 4.0 * np.sin(0.5 * H * np.arange(900))

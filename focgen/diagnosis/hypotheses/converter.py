@@ -15,6 +15,7 @@ import numpy as np
 
 from focgen.diagnosis.fitting.fit import WHITE, Fit, Weighing, fit, problem_residual
 from focgen.diagnosis.fitting.pinned import pinned
+from focgen.diagnosis.hypotheses.blurred import noise_ahead, part_that_stays
 from focgen.diagnosis.hypotheses.rivals import Cause, Rival, share_of
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import CandidateEffect, Problem
@@ -31,17 +32,25 @@ _EASED = (0.2, 0.06)  # of a step: what it rises in, as it is fitted
 
 @dataclass(frozen=True, eq=False)
 class Converter:
-    """The rounding ``candidate``, its ``entries`` of a problem's vector, and its ``step`` as a share of the
-    output's level."""
+    """The rounding ``candidate``, its ``entries`` of a problem's vector, its ``step`` as a share of the
+    output's level, and the ``noise`` ahead of it, in steps."""
 
     candidate: CandidateEffect
     entries: tuple[float, ...]
     step: float
+    noise: float = 0.0
 
     @property
     def uneven(self) -> float:
-        """Root mean square, as a share of the output's level, that real steps miss the ideal ones by."""
-        return NUMBERS.uneven * self.step
+        """Root mean square, as a share of the output's level, that real steps miss the reading by, in the
+        mean over noise that blurs them; no less than they miss ideal ones by."""
+        return self.step * max(NUMBERS.uneven * part_that_stays(self.noise), NUMBERS.stepped)
+
+    @property
+    def blurred(self) -> bool:
+        """Whether noise has made the reading follow what is ahead of the steps more closely than the steps:
+        simulated without noise, they are no closer to it."""
+        return part_that_stays(self.noise) < NUMBERS.stays
 
     @property
     def left(self) -> float:
@@ -52,7 +61,8 @@ class Converter:
         """The same with levels that go on ``lag`` of a step late, on either way."""
         form = form_of(self.candidate.effect, "sluggish")
         entries = (*self.entries, lag)
-        return Converter(pinned(replace(self.candidate, form=form), entries), entries, self.step)
+        late = pinned(replace(self.candidate, form=form), entries)
+        return replace(self, candidate=late, entries=entries)
 
     def explains(self, of: Fit) -> bool:
         """Whether the residual is no larger than what a converter's steps leave."""
@@ -133,17 +143,25 @@ def converter_of(problem: Problem, candidates: Sequence[CandidateEffect]) -> Con
             scales = [problem.references.scale(p, slot) for p in candidate.form.parameters]
             entries = tuple(v / s for v, s in zip(values, scales))
             held = pinned(candidate, entries)
-            found = Converter(held, entries, values[0] / problem.segment.level_out)
-            read = _is_sharp(problem, candidate, values) or _is_read(problem, found, values)
+            levels = _levels(problem, candidate, values)
+            noise = noise_ahead(levels / values[0], problem.segment.run.spans)
+            found = Converter(held, entries, values[0] / problem.segment.level_out, noise)
+            read = _is_sharp(problem, levels) or _is_read(problem, found, values)
             return found if read else None
     return None
 
 
-def _is_sharp(problem: Problem, candidate: CandidateEffect, values: Values) -> bool:
+def _levels(problem: Problem, candidate: CandidateEffect, values: Values) -> np.ndarray:
+    """The output's readings (n,), each as the level it is of."""
+    segment = problem.segment
+    made: np.ndarray = candidate.form.act(segment.y, values, segment.run)
+    return made
+
+
+def _is_sharp(problem: Problem, levels: np.ndarray) -> bool:
     """Whether most readings are levels, but for the rounding of the file, or there are hardly more readings
     than levels: a finer converter behind the coarse one gives each level as its own nearest."""
     y = problem.segment.y
-    levels = candidate.form.act(y, values, problem.segment.run)
     few = len(np.unique(y)) <= _READINGS * len(np.unique(levels))
     return few or bool(_SHARP * np.median(np.abs(y - levels)) < np.ptp(y))
 
@@ -151,17 +169,16 @@ def _is_sharp(problem: Problem, candidate: CandidateEffect, values: Values) -> b
 def _is_read(problem: Problem, found: Converter, values: Values) -> bool:
     """Whether the levels are the reading's and no rests of the rig."""
     nominal = fit(problem, problem.nominal(), WHITE, _REFITTED)
-    if _moves_on(nominal, found.candidate, values):
+    if _moves_on(nominal, _levels(problem, found.candidate, values)):
         return True
     both, _ = found.beside(nominal, nominal, (), WHITE)
     return rms(both.weighed) < NUMBERS.unlikely * rms(nominal.weighed)
 
 
-def _moves_on(nominal: Fit, candidate: CandidateEffect, values: Values) -> bool:
-    """Whether the model moves, while the reading stays on a level, by more than the reading does. A second
-    effect may hide that its steps bring the model closer."""
+def _moves_on(nominal: Fit, levels: np.ndarray) -> bool:
+    """Whether the model moves, while the reading stays on one of its ``levels`` (n,), by more than the
+    reading does. A second effect may hide that its steps bring the model closer."""
     segment = nominal.problem.segment
-    levels = candidate.form.act(segment.y, values, segment.run)
     stay = np.cumsum((np.diff(levels, prepend=levels[0]) != 0.0) | (segment.run.rest != 0)) - 1
     made, count = nominal.problem.simulate(nominal.vector), np.bincount(stay)
     middle = np.bincount(stay, made) / count

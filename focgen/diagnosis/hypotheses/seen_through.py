@@ -81,7 +81,7 @@ def _with_steps(
 ) -> tuple[Fit, tuple[Cause, ...]]:
     nominal, weighing = beside.nominal, beside.weighing
     noise = converter.is_noise(nominal, alone=not best.problem.candidates)
-    nothing = asked.granted or (noise and best.predictable_share < NUMBERS.left)
+    nothing = asked.granted or converter.blurred or (noise and best.predictable_share < NUMBERS.left)
     seen = None if nothing else _seen_through(converter, best, beside, asked)
     if seen is None:
         return converter.beside(best, nominal, causes, weighing)

@@ -1,0 +1,44 @@
+"""Noise ahead of a converter blurs its steps, and is read off how its readings go and come back.
+
+Red when a rig that moves passes for noise, when steps behind noise are taken for sharper or duller than they
+are, or when the curve that steps are in the mean is not what readings of one place show.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from focgen.diagnosis.hypotheses.blurred import noise_ahead, part_that_stays
+
+SPANS = [(0, 3000), (3000, 6000)]
+
+
+def read(noise: float, seed: int = 1, pace: float = 0.003) -> np.ndarray:
+    """Readings, in steps, of a slow sine with ``noise`` ahead."""
+    sine = 6.0 * np.sin(pace * np.arange(6000)) + 0.3
+    return np.round(sine + noise * np.random.default_rng(seed).normal(size=6000))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("noise", [0.1, 0.2, 0.35, 0.5, 0.8])
+def test_noise_is_found_to_a_twentieth_of_a_step(noise, seed):
+    assert noise_ahead(read(noise, seed), SPANS) == pytest.approx(noise, abs=0.05)
+
+
+@pytest.mark.parametrize("pace", [0.0003, 0.003, 0.03, 0.3, 1.0])
+def test_what_moves_is_no_noise(pace):
+    assert noise_ahead(read(0.0, pace=pace), SPANS) < 0.05
+
+
+def test_readings_too_few_tell_no_noise():
+    assert noise_ahead(read(0.5)[:40], [(0, 20), (20, 40)]) == 0.0
+    assert noise_ahead(read(5.0), SPANS) == 1.0
+
+
+@pytest.mark.parametrize("noise", [0.05, 0.1, 0.2, 0.3])
+def test_the_curve_that_stays_is_what_many_readings_of_a_place_have_in_the_mean(noise):
+    """Steps without noise miss by 1/√12 of a step."""
+    rng, places = np.random.default_rng(5), (np.arange(100) + 0.5) / 100
+    missed = [np.mean(np.round(p + noise * rng.normal(size=200_000))) - p for p in places]
+    assert np.std(missed) * np.sqrt(12.0) == pytest.approx(part_that_stays(noise), abs=0.01)
