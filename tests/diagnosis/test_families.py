@@ -180,7 +180,7 @@ def test_effects_that_leave_more_than_they_close_stand_for_something_else(
     """Steps of a rounding leave what they leave: no model has them where they fall."""
     monkeypatch.setattr(summary, "is_rounded", lambda causes: rounded)
     squares = {"refitted": np.array([1.0]), "explained": np.array([explained])}
-    made = summary.Summary(None, [(SimpleNamespace(causes=()), None)], {}, squares, 0.1, None)
+    made = summary.Summary(None, [(SimpleNamespace(causes=(), beside={}), None)], {}, squares, 0.1, None)
     assert made.more_is_left == more
     assert made.stands_for_more == (more and not rounded)
     assert ["2.8 times the noise" in note for note in the_rest(made)] == [True] * (more and not rounded)
@@ -216,5 +216,5 @@ def closing(refitted, explained, lost, pace=0.0):
     """One cause that closes so much of a gap above a noise of 0.1."""
     squares = {"refitted": np.array([refitted]), "explained": np.array([explained])}
     total = Improvement(0.7, (0.0, 1.0), lost)
-    found = SimpleNamespace(causes=(), segment=SimpleNamespace(pace=pace))
+    found = SimpleNamespace(causes=(), beside={}, segment=SimpleNamespace(pace=pace))
     return summary.Summary(None, [(found, None)], {}, squares, 0.1, total)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 
 import numpy as np
@@ -47,7 +47,8 @@ _BELIEVED = 6.0  # uncertainties that a number may be off beside an effect: beyo
 class Explanation:
     """A segment explained. ``nominal``: its nominal parameters refitted; ``best``: with the effects. Each has
     a ``predictability`` of its residual from the inputs. ``errors``: by family, the root-mean-square
-    residual with that effect alone, as a share of the refitted nominal's; ``converter``: the coarse one;
+    residual with that effect alone, as a share of the refitted nominal's; ``beside``: the same of one more
+    beside those found, as a share of what they leave; ``converter``: the coarse one;
     ``whole``: what this is the part of that is not in question, or no effect at all; ``pairs``: makes the
     ``others``, once, which takes as long as the rest: of most explanations nobody asks for them.
     """
@@ -61,6 +62,7 @@ class Explanation:
     predictability: Predictability
     nominal_predictability: Predictability
     errors: dict[str, float]
+    beside: dict[str, float] = field(default_factory=dict)
     converter: Converter | None = None
     whole: Explanation | None = None
     pairs: Callable[[], tuple[TwoOthers, ...]] = tuple
@@ -228,7 +230,7 @@ def _explained(
     best, weighing = _sifted(rankings[-1], asked, known)
     pairs = partial(two_others, best, rankings[0], candidates, weighing, asked)
     nominal = fit(problem, rankings[0].base.vector[: len(given)], weighing)
-    errors = rankings[0].errors
+    errors, every = rankings[0].errors, rankings
     if remembers(best) and not asked.granted and (seen := unleft(best)) is not None:
         best, nominal = (moved_to(f, seen, weighing) for f in (best, nominal))
         best, rankings = _dropped(best, weighing, threshold, known), []
@@ -251,10 +253,18 @@ def _explained(
         predictability(segment, best.weighed, response),
         predictability(segment, nominal.weighed, response),
         errors,
+        _beside(best, every),
         converter,
         pairs=tuple if granted else cache(pairs),
     )
     return _off_by_itself(made, examined.off)
+
+
+def _beside(best: Fit, rankings: Sequence[Ranking]) -> dict[str, float]:
+    """The error with one more effect beside those of ``best``, by family, as a share of what they leave."""
+    families = best.problem.families
+    alike = [r for r in rankings if set(r.base.problem.families) == set(families)]
+    return {n: e for n, e in alike[-1].errors.items() if n not in families} if alike and families else {}
 
 
 def _off_by_itself(e: Explanation, off: Examined | None) -> Explanation:

@@ -20,6 +20,7 @@ from focgen.diagnosis.verdict.sizes import at_their_ends
 from focgen.diagnosis.verdict.summary import Summary, doubts
 from focgen.diagnosis.verdict.unexplained import acts_besides, disturbed, is_driven
 from focgen.logs.notes import listed
+from focgen.rig.effects import library
 from focgen.rig.rig import Rig
 
 _NEAR = 0.95  # of the error without any effect: with more a family is not near
@@ -86,6 +87,22 @@ def the_rest(summary: Summary) -> Iterator[str]:
                 f"{_within(e)}: what is left is {np.sqrt(louder(e)):.1f} times as large where the rig moves "
                 "as where it rests, which noise is not: something else acts there, which it may stand for"
             )
+        elif (further := _further(e)) is not None:
+            follows = f"{e.amiss:.0%} of what is left follows the {e.segment.entry}"
+            yield (
+                f"{_within(e)}: {follows}. With {further} as well the error would be {e.beside[further]:.2g} "
+                "of that: it may be there, too, or the form of what was found lacks as much"
+            )
+
+
+def _further(e: Explanation) -> str | None:
+    """The family that would take most of what effects leave, where inputs predict much of that and it takes
+    as much as what is no wonder of a form."""
+    asked = {n: error for n, error in e.beside.items() if not library()[n].rounds}
+    if not asked or e.amiss < NUMBERS.much:
+        return None
+    name = min(asked, key=lambda n: asked[n])
+    return name if asked[name] ** 2 < NUMBERS.unlikely else None
 
 
 def _little(share: float) -> str:
