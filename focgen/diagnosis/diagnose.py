@@ -79,12 +79,12 @@ def diagnose(
     ran = None if which is None else check_controller(which, session)
     nominal = with_its_way(nominal, session)
     turn = turn_of(nominal)
-    if turn.roles:
+    if turn:
         session, nominal = tuple(turn.log(log, nominal) for log in session), turn.rig(nominal)
     diagnosis, asked = _diagnosed(nominal, session, ran, only, bootstrap)
-    if turn.roles:
-        logged = tuple(turn.log(log, nominal) for log in session)
-        said = doubts(replace(turn.rig(nominal), known=()), logged)
+    if turn:
+        logged = tuple(turn.back.log(log, nominal) for log in session)
+        said = doubts(replace(turn.back.rig(nominal), known=()), logged)
         diagnosis = replace(turned_back(diagnosis, turn), warnings=said)
     if out is not None:
         from focgen.diagnosis.write import write

@@ -10,32 +10,34 @@ from focgen.logs.experiment import ROLES
 from focgen.logs.notes import listed
 from focgen.rig.effects import Form, library
 from focgen.rig.placed import EARLY, slot_in
-from focgen.rig.rig import Rig
+from focgen.rig.rig import Origins, Rig
 from focgen.rig.stages import ENTERS, LEAVES
 from focgen.rig.turned import Turn
 
 _WAYS = {"rising": "falling", "falling": "rising"}
 _COUNTED = "the {} below 0, or against the input: ceilings, widths and places count magnitudes there"
+_FROM = "the {} rests at {}, farther from 0 than the output moves: effects count it from there"
 
 
 def turned_back(diagnosis: Diagnosis, turn: Turn) -> Diagnosis:
     """The diagnosis with its rigs, and what its figures draw, in the signals as logged, and a note on how
     effects are counted."""
+    back = turn.back
     refitted, augmented, drawn = diagnosis.refitted, diagnosis.augmented, diagnosis.drawn
     return replace(
         diagnosis,
         causes=tuple(_signed(found, turn) for found in diagnosis.causes),
-        refitted=None if refitted is None else _rig(refitted, turn),
-        augmented=None if augmented is None else _rig(augmented, turn),
-        drawn=None if drawn is None else _drawn(drawn, turn),
+        refitted=None if refitted is None else _rig(refitted, back),
+        augmented=None if augmented is None else _rig(augmented, back),
+        drawn=None if drawn is None else _drawn(drawn, back),
         notes=(*diagnosis.notes, *_said(diagnosis, turn)),
     )
 
 
-def _rig(rig: Rig, turn: Turn) -> Rig:
+def _rig(rig: Rig, back: Turn) -> Rig:
     """A rig in the signals as logged, which says how effects count where it has any."""
-    back = turn.rig(rig)
-    return back if back.effects else replace(back, downwards=frozenset())
+    logged = back.rig(rig)
+    return logged if logged.effects else replace(logged, downwards=frozenset(), origins=Origins())
 
 
 def _signed(found: Found, turn: Turn) -> Found:
@@ -65,37 +67,59 @@ def _role(form: Form, stage: str) -> str:
 def _said(diagnosis: Diagnosis, turn: Turn) -> list[str]:
     """How effects count, where there are any, with the logged signals that go downwards."""
     refitted = diagnosis.refitted
-    logged = {} if refitted is None else refitted.signals.columns()
-    roles = [role for role in ROLES if role in turn.roles and role in logged and role != "reference"]
-    if not diagnosis.causes or not roles:
+    if refitted is None or not diagnosis.causes:
         return []
-    return [_COUNTED.format(f"{listed(roles)} {'go' if len(roles) > 1 else 'goes'}")]
+    signals = refitted.signals
+    logged = [role for role in ROLES if role in signals.columns() and role != "reference"]
+    roles = [role for role in logged if role in turn.roles]
+    said = [_COUNTED.format(f"{listed(roles)} {'go' if len(roles) > 1 else 'goes'}")] if roles else []
+    for role in logged:
+        if lies := getattr(turn.origins, role, 0.0):
+            said.append(_FROM.format(role, f"{lies:.6g} {signals.unit_of(role) or ''}".rstrip()))
+    return said
 
 
-def _drawn(drawn: Drawn, turn: Turn) -> Drawn:
-    entry, exit = (turn.signs[role] for role in drawn.worst)
-    of_input, of_output = turn.signs[drawn.entry], turn.signs["output"]
+def _drawn(drawn: Drawn, back: Turn) -> Drawn:
+    entry, exit = drawn.worst
     residual = drawn.residual
     return replace(
         drawn,
-        traces=tuple(_trace(trace, of_input, of_output) for trace in drawn.traces),
-        means=tuple(_mean(mean, entry, exit) for mean in drawn.means),
-        residual=None if residual is None else _residual(residual, entry, exit),
+        traces=tuple(_trace(trace, drawn.entry, back) for trace in drawn.traces),
+        means=tuple(_mean(mean, entry, exit, back) for mean in drawn.means),
+        residual=None if residual is None else _residual(residual, entry, exit, back),
     )
 
 
-def _trace(trace: Trace, entry: int, exit: int) -> Trace:
-    made = {name: exit * getattr(trace, name) for name in ("measured", "as_given", "refitted", "explained")}
-    return replace(trace, input=entry * trace.input, **made)
+def _trace(trace: Trace, entry: str, back: Turn) -> Trace:
+    return replace(
+        trace,
+        input=back.signal(trace.input, entry),
+        measured=back.signal(trace.measured, "output"),
+        as_given=back.signal(trace.as_given, "output"),
+        refitted=back.signal(trace.refitted, "output"),
+        explained=back.signal(trace.explained, "output"),
+    )
 
 
-def _mean(mean: Mean, entry: int, exit: int) -> Mean:
-    if entry > 0 or mean.over == "time":
-        return replace(mean, mean=exit * mean.mean)
+def _mean(mean: Mean, entry: str, exit: str, back: Turn) -> Mean:
+    """A mean of residuals, which have no origin, over a signal's level, its rate, or time."""
+    sign = back.signs[exit]
+    if mean.over == "time":
+        return replace(mean, mean=sign * mean.mean)
+    place = back.signal(mean.place, entry) if mean.over == "level" else back.signs[entry] * mean.place
+    if back.signs[entry] > 0:
+        return replace(mean, place=place, mean=sign * mean.mean)
     way = _WAYS.get(mean.way, mean.way)
-    return replace(mean, way=way, place=-mean.place[::-1], mean=exit * mean.mean[::-1])
+    return replace(mean, way=way, place=place[::-1], mean=sign * mean.mean[::-1])
 
 
-def _residual(residual: Residual, entry: int, exit: int) -> Residual:
-    found = {name: entry * getattr(residual, name) for name in ("level", "rate", "way")}
-    return replace(residual, **found, refitted=exit * residual.refitted, explained=exit * residual.explained)
+def _residual(residual: Residual, entry: str, exit: str, back: Turn) -> Residual:
+    into, out = back.signs[entry], back.signs[exit]
+    return replace(
+        residual,
+        level=back.signal(residual.level, entry),
+        rate=into * residual.rate,
+        way=into * residual.way,
+        refitted=out * residual.refitted,
+        explained=out * residual.explained,
+    )

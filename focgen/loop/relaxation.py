@@ -76,7 +76,7 @@ class Plant:
         turn = turn_of(self.rig)
         x = turn.signs["command"] * x
         Chain(turn.rig(self.rig), self.placed).run(x, "regulator", "sensor", run, held, tap)
-        made = turn.signals({LEAVES[stage]: y for stage, y in tap.items()})
+        made = turn.back.signals({LEAVES[stage]: y for stage, y in tap.items()})
         return {role: y[self.lead * self.parts :] for role, y in made.items()}
 
 

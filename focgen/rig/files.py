@@ -23,6 +23,7 @@ from focgen.rig.rig import (
     Actuator,
     Delays,
     LinearActuator,
+    Origins,
     Ranges,
     Relative,
     Rig,
@@ -64,6 +65,7 @@ def read_rig(path: str | Path | Mapping[str, Any]) -> Rig:
         uncertainty=_uncertainty(top.table("uncertainty")),
         between=_between(top.section("signals", _WHICH)),
         downwards=_downwards(top.section("signals", _WHICH)),
+        origins=_origins(top.section("signals", _WHICH)),
     )
     top.table(TABLE)  # tells where the rig is from, and nothing of what it is
     top.done()
@@ -77,7 +79,8 @@ def _signals(top: Table) -> Signals:
     named = {role: _column(table, role) for role in _ROLES}
     found = {role: column for role, (column, _) in named.items()} | {"run": table.text("run")}
     table.text("between")
-    table.raw("downwards")
+    for key in ("downwards", "origins"):
+        table.raw(key)
     table.done()
     if found["command"] is None and found["pressure"] is None:
         raise table.fail(None, "has neither 'command' nor 'pressure'", "name the column of the input")
@@ -111,6 +114,16 @@ def _downwards(table: Table) -> frozenset[str]:
     if not isinstance(roles, list) or not all(role in ROLES for role in roles):
         raise table.fail("downwards", f"is {roles!r}", f"give a list of {', '.join(ROLES)}")
     return frozenset(roles)
+
+
+def _origins(table: Table) -> Origins:
+    """Where effects count signals from."""
+    given = table.table("origins")
+    if given is None:
+        return Origins()
+    found = Origins(**{role: given.number(role, 0.0) for role in vars(Origins())})
+    given.done()
+    return found
 
 
 def _column(table: Table, role: str) -> tuple[str | None, Scale | None]:
@@ -325,7 +338,11 @@ def _bounds_table(rig: Rig) -> dict[str, Any]:
 def _input_table(rig: Rig) -> dict[str, Any]:
     """What the file says of the rig's input, where it says something."""
     table: dict[str, Any] = {} if rig.between is None else {"between": rig.between.name.lower()}
-    return table | ({"downwards": [r for r in ROLES if r in rig.downwards]} if rig.downwards else {})
+    if rig.downwards:
+        table["downwards"] = [r for r in ROLES if r in rig.downwards]
+    if rig.origins:
+        table["origins"] = {role: at for role, at in vars(rig.origins).items() if at}
+    return table
 
 
 def _signals_table(signals: Signals) -> dict[str, Any]:

@@ -76,13 +76,13 @@ def replay(rig: RigLike, logs: Logs, from_: float | None = None, to: float | Non
     given = rig_of(rig)
     session = experiments(given, logs, from_, to)
     turn = turn_of(given)
-    if given.effects and turn.roles:
+    if given.effects and turn:
         turned = _replayed(turn.rig(given), [turn.log(log, given) for log in session])
-        back = {name: turn.signals(made) for name, made in turned.simulated.items()}
-        told = turn.rig(present(turned.rig))
-        session = tuple(turn.log(log, given) for log in turned.experiments)
+        made = {name: turn.back.signals(made) for name, made in turned.simulated.items()}
+        told = turn.back.rig(present(turned.rig))
+        session = tuple(turn.back.log(log, given) for log in turned.experiments)
         said = doubts(told, session)
-        return replace(turned, simulated=back, rig=told, experiments=session, warnings=said)
+        return replace(turned, simulated=made, rig=told, experiments=session, warnings=said)
     return _replayed(given, session)
 
 

@@ -172,13 +172,25 @@ class Ranges:
 
 
 @dataclass(frozen=True)
+class Origins:
+    """Where effects count a signal from, in the log's unit."""
+
+    curvature: float = 0.0
+    output: float = 0.0
+
+    def __bool__(self) -> bool:
+        return bool(self.curvature or self.output)
+
+
+@dataclass(frozen=True)
 class Rig:
     """The nominal rig. ``sample_time`` in s; ``effects`` are the ``[[effects]]`` tables as read; ``between``:
     what its first input does from one sample to the next, None where logs are to tell. ``zero``: what is
     added to the sensor's reading, in the output's unit. ``downwards``: the roles whose signals effects count
-    from 0 down. Of no file are ``known``, effects (:class:`focgen.rig.placed.Placed`) that are run wherever
-    the rig is, as its numbers are, and ``turned``, the roles whose signals it is run with the other sign of
-    (:mod:`focgen.rig.turned`)."""
+    downwards, and ``origins``, where they count them from. Of no file are ``known``, effects
+    (:class:`focgen.rig.placed.Placed`) that are run wherever the rig is, as its numbers are. Nor are
+    ``turned``, the roles whose signals it is run with the other sign of, and ``moved``, where they are run
+    from (:mod:`focgen.rig.turned`)."""
 
     name: str
     sample_time: float
@@ -193,12 +205,18 @@ class Rig:
     between: Between | None = None
     zero: float = 0.0
     downwards: frozenset[str] = frozenset()
+    origins: Origins = Origins()
     known: tuple[Any, ...] = field(default=(), repr=False)
     turned: frozenset[str] = field(default=frozenset(), repr=False)
+    moved: Origins = field(default=Origins(), repr=False)
 
     def sign(self, role: str) -> int:
         """What the signal of a role is times, to be as it was logged: 1 or −1."""
         return -1 if role in self.turned else 1
+
+    def as_logged(self, role: str, value: float) -> float:
+        """A value of a role's signal, as it was logged."""
+        return self.sign(role) * value + float(getattr(self.moved, role, 0.0))
 
     @property
     def integrator(self) -> str | None:

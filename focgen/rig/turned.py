@@ -1,10 +1,13 @@
-"""Rigs whose signals go below 0, or against their inputs, run with the other sign.
+"""Rigs whose signals go below 0, against their inputs, or lie far above 0, run from where they rest, upwards.
 
 A ceiling, an obstacle or a valve that vents is written for signals that rise from 0, and friction for a gain
 above 0. A vacuum, a bend the other way and a drive mounted the other way round are the same rigs with another
 sign. So they are turned where a session comes in, until every stage has a gain above 0 and the input rises
 from 0, and what is found is turned back. The numbers of effects count as in the turned signals, and the rig's
 file says which these are.
+
+A curve, a ceiling or a loop is a part of what a signal moves. Of a temperature in kelvin that is little, so
+an output that lies further above 0 than it moves is run from where the rig rests.
 """
 
 from __future__ import annotations
@@ -20,17 +23,30 @@ from focgen.fractional.transfer import TransferFunction
 from focgen.jsontext import fits
 from focgen.logs.begin import Begin
 from focgen.logs.experiment import ROLES, Experiment
-from focgen.rig.rig import Actuator, LinearActuator, Ranges, Rig
+from focgen.rig.rig import Actuator, LinearActuator, Origins, Ranges, Rig
 from focgen.rig.session import entry_of
 
 _DOWN = 4.0  # times as much below 0 as above, over the session: an input that goes both ways has no sign
+_FAR = 1.0  # times what a signal moves: one that rests as far from 0, or farther, is run from there
+_AT_0 = Origins()
 
 
 @dataclass(frozen=True)
 class Turn:
-    """The ``signs`` by role, 1 or −1, that the signals of a rig are run with."""
+    """The ``signs`` by role, 1 or −1, that the signals of a rig are run with, and the ``origins`` that they
+    are run from."""
 
     signs: Mapping[str, int]
+    origins: Origins = _AT_0
+
+    def __bool__(self) -> bool:
+        return bool(self.roles or self.origins)
+
+    @property
+    def back(self) -> Turn:
+        """What turns back."""
+        k, y = (0.0 - self.signs[role] * getattr(self.origins, role) for role in ("curvature", "output"))
+        return Turn(self.signs, Origins(k, y))
 
     @property
     def roles(self) -> frozenset[str]:
@@ -38,44 +54,73 @@ class Turn:
         return frozenset(role for role, sign in self.signs.items() if sign < 0)
 
     def rig(self, rig: Rig) -> Rig:
-        """The rig in the turned signals, or of one in these the rig as it was."""
-        if not self.roles:
+        """The rig in the turned signals."""
+        if not self:
             return rig
         u, p, k, y = (self.signs[role] for role in ("command", "pressure", "curvature", "output"))
-        ends = {"command": u, "pressure": p, "output": y}
-        spans = {role: _span(span, ends[role]) for role, span in rig.ranges.stated().items()}
+        spans = {role: self._span(span, role) for role, span in rig.ranges.stated().items()}
+        lies = self.origins
+        zero = rig.zero - lies.output + (rig.sensor.dc_gain * lies.curvature if lies.curvature else 0.0)
         return replace(
             rig,
             regulator=_times(rig.regulator, u * p),
-            actuator=_turned(rig.actuator, p, k),
+            actuator=_turned(rig.actuator, p, k, lies.curvature),
             sensor=_times(rig.sensor, k * y),
-            zero=y * rig.zero or 0.0,
+            zero=y * zero or 0.0,
             ranges=replace(Ranges(), **spans),
-            effects=tuple(_learned(table, y) for table in rig.effects),
+            effects=tuple(self._learned(table) for table in rig.effects),
             downwards=rig.turned,
             turned=rig.downwards,
+            origins=rig.moved,
+            moved=rig.origins,
         )
 
     def signals(self, signals: Mapping[str, Array]) -> dict[str, Array]:
         """Signals by role, turned; others as they are."""
-        return {role: -x if self.signs.get(role, 1) < 0 else x for role, x in signals.items()}
+        return {role: self.signal(x, role) for role, x in signals.items()}
+
+    def signal(self, x: Array, role: str) -> Array:
+        """One signal, turned."""
+        if lies := self._origin(role):
+            x = x - lies
+        return -x if self.signs.get(role, 1) < 0 else x
+
+    def _origin(self, role: str) -> float:
+        """A reference is run as the output is."""
+        return float(getattr(self.origins, "output" if role == "reference" else role, 0.0))
 
     def log(self, log: Experiment, rig: Rig) -> Experiment:
         """An experiment with ``rig``, turned; what is told of its begin, too."""
-        begins = {role: _began(begin, self.signs.get(role, 1)) for role, begin in log.begins.items()}
+        begins = {role: self._began(begin, role) for role, begin in log.begins.items()}
         rows = None if log.rows is None else self.signals(log.rows)
         stands = self.signs["pressure" if rig.integrator == "regulator" else "curvature"] * log.stands
         return replace(log, signals=self.signals(log.signals), rows=rows, begins=begins, stands=stands or 0.0)
 
+    def _span(self, span: tuple[float, float], role: str) -> tuple[float, float]:
+        low, high = sorted(float(x) for x in self.signal(np.array(span), role))
+        return low + 0.0, high + 0.0  # no −0
+
+    def _learned(self, table: Mapping[str, Any]) -> Mapping[str, Any]:
+        """An effect's table with the outputs at which it was learned turned, where it tells them."""
+        learned = table.get("learned")
+        if not isinstance(learned, list) or not fits(learned, [float, float]):
+            return table
+        return {**table, "learned": list(self._span((learned[0], learned[1]), "output"))}
+
+    def _began(self, begin: Begin, role: str) -> Begin:
+        levels = self.signal(np.array(begin.levels), role)
+        return replace(begin, levels=tuple(float(level) + 0.0 for level in levels))
+
 
 def turn_of(rig: Rig) -> Turn:
-    """What turns the signals that a rig says go downwards."""
-    return Turn({role: -1 if role in rig.downwards else 1 for role in ROLES})
+    """What turns the signals that a rig says go downwards, and moves those that it says lie far from 0."""
+    return Turn({role: -1 if role in rig.downwards else 1 for role in ROLES}, rig.origins)
 
 
 def with_its_way(rig: Rig, logs: Sequence[Experiment]) -> Rig:
-    """The rig, told which signals go downwards, by the logs and by the signs of its gains. One that has
-    effects says by itself how they count; what one without them says is of another session."""
+    """The rig, told which signals go downwards and which lie far from 0, by the logs, by the signs of its
+    gains and by where it rests. One that has effects says by itself how they count; what one without them
+    says is of another session."""
     entry = entry_of(logs)
     if rig.effects or any(entry not in log for log in logs):
         return rig
@@ -87,7 +132,18 @@ def with_its_way(rig: Rig, logs: Sequence[Experiment]) -> Rig:
     k = p * _sign_of(rig, p, entry, most)
     y = k * _sign(rig.sensor)
     signs = {"command": u, "pressure": p, "curvature": k, "output": y, "reference": y}
-    return replace(rig, downwards=Turn(signs).roles)
+    return replace(rig, downwards=Turn(signs).roles, origins=_origins(rig, logs))
+
+
+def _origins(rig: Rig, logs: Sequence[Experiment]) -> Origins:
+    """The rig's own zeros, of the signals whose zero is farther from 0 than the output moves in ``logs``."""
+    gain = rig.sensor.dc_gain
+    if any("output" not in log for log in logs) or not np.isfinite(gain):
+        return Origins()
+    lies = 0.0 if rig.actuator is None else rig.actuator.offset
+    read = rig.zero + gain * lies
+    moves = _FAR * float(np.ptp(np.concatenate([np.asarray(log["output"], float) for log in logs])))
+    return Origins(lies if abs(gain * lies) > moves else 0.0, read if abs(read) > moves else 0.0)
 
 
 def _sign(transfer: TransferFunction) -> int:
@@ -109,10 +165,12 @@ def _sign_of(rig: Rig, p: int, entry: str, most: float) -> int:
     return -1 if p * float(actuator.drive(largest)) < 0.0 else 1
 
 
-def _turned(actuator: Actuator | LinearActuator | None, p: int, k: int) -> Actuator | LinearActuator | None:
+def _turned(
+    actuator: Actuator | LinearActuator | None, p: int, k: int, lies: float
+) -> Actuator | LinearActuator | None:
     if actuator is None:
         return None
-    offset = k * actuator.offset or 0.0
+    offset = k * (actuator.offset - lies) or 0.0
     if isinstance(actuator, LinearActuator):
         dynamics = _times(actuator.dynamics, p * k)
         return replace(actuator, dynamics=dynamics, offset=offset, bias=p * actuator.bias or 0.0)
@@ -124,19 +182,3 @@ def _times(transfer: TransferFunction, sign: int) -> TransferFunction:
     if sign > 0:
         return transfer
     return transfer * -1.0
-
-
-def _span(span: tuple[float, float], sign: int) -> tuple[float, float]:
-    return span if sign > 0 else (0.0 - span[1], 0.0 - span[0])
-
-
-def _learned(table: Mapping[str, Any], sign: int) -> Mapping[str, Any]:
-    """An effect's table with the outputs at which it was learned turned, where it tells them."""
-    learned = table.get("learned")
-    if sign > 0 or not isinstance(learned, list) or not fits(learned, [float, float]):
-        return table
-    return {**table, "learned": [0.0 - learned[1], 0.0 - learned[0]]}
-
-
-def _began(begin: Begin, sign: int) -> Begin:
-    return begin if sign > 0 else replace(begin, levels=tuple(0.0 - level for level in begin.levels))

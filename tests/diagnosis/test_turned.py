@@ -15,7 +15,7 @@ from focgen.diagnosis.diagnose import diagnose
 from focgen.diagnosis.proposals.identifiability import plan
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import ROLES, Experiment
-from focgen.rig.rig import LinearActuator, Ranges, Rig, Signals
+from focgen.rig.rig import LinearActuator, Origins, Ranges, Rig, Signals
 from focgen.rig.turned import Turn
 
 H, FINER, COUNT = 0.02, 10, 900
@@ -117,8 +117,36 @@ def _check_rigs(found, rig, logs, folder):
     assert np.sqrt(np.mean(left**2)) < 1.1 * found.gap.explained
     for trace, log in zip(found.drawn.traces, logs, strict=True):
         step = round(len(log) / len(trace.measured))
-        np.testing.assert_array_equal(trace.measured, log["output"][::step])
+        np.testing.assert_allclose(trace.measured, log["output"][::step], atol=1e-12)
         np.testing.assert_array_equal(trace.input, log["command"][::step])
+
+
+def lifted(rig, logs, curvature, output):
+    """The same rig with other zeros."""
+    actuator = replace(rig.actuator, offset=rig.actuator.offset + curvature)
+    far = [replace(log, signals=log.signals | {"output": log["output"] + curvature + output}) for log in logs]
+    return replace(rig, actuator=actuator, zero=rig.zero + output), far
+
+
+@pytest.mark.parametrize(
+    "effect, curvature, output",
+    [("sensor_saturation", 0.0, 32.0), ("sensor_saturation", -32.0, 0.0), ("friction", 0.0, 64.0)],
+)
+def test_what_is_found_has_no_origin(effect, curvature, output, tmp_path):
+    """A thermometer in kelvin that ends 30 K above its room was a bent one (0.57), or a bent gain."""
+    rig, logs = RIGS[effect][0]()
+    as_it_was = diagnose(rig, logs, pictures=False)
+    given = lifted(rig, logs, curvature, output)
+    found = diagnose(*given, out=tmp_path, pictures=False)
+    first, again = (d.causes[0].candidates[0] for d in (as_it_was, found))
+    assert again.effect == effect and again.confidence == pytest.approx(first.confidence, abs=1e-4)
+    assert again.parameters.keys() == first.parameters.keys()
+    for name, number in first.parameters.items():
+        assert again.parameters[name].value == pytest.approx(number.value, rel=1e-4)
+    assert found.gap.explained == pytest.approx(as_it_was.gap.explained, rel=1e-4)
+    assert found.augmented.origins == Origins(curvature, curvature + output)
+    assert not found.refitted.origins and any(f"rests at {curvature + output:g}" in n for n in found.notes)
+    _check_rigs(found, *given, tmp_path)
 
 
 def test_an_experiment_is_proposed_on_the_side_where_the_logs_are(tmp_path):

@@ -105,7 +105,7 @@ class _Asked:
             parts.append(f"{faster} than {self.rate:.3g} {unit}/s")
         parts.append(f"{self.choice.seconds:.0f} s")
         if limits.integrates:
-            stands = rig.sign("output") * present(self.bounds.stands)
+            stands = rig.as_logged("output", present(self.bounds.stands))
             place = f"{stands:.3g} {signals.unit_of('output')}".strip()
             left = self.bounds.left
             parts.append(f"from where it stands at {place}" if left else f"brought to {place} first")
