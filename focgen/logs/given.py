@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from numbers import Real
 from typing import Literal
@@ -41,6 +42,19 @@ def checked_in_memory(log: Experiment) -> Experiment:
         raise LogError(where, "has no samples", _REMEDY)
     same = all(signals[role] is log.signals[role] for role in signals)
     return log if same else replace(log, signals=signals)
+
+
+def with_names_apart(logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
+    """The experiments, those of one name numbered: results are told by it."""
+    names = [log.name for log in logs]
+    taken, found = set(names), []
+    for log in logs:
+        name = log.name
+        if names.count(name) > 1:
+            name = next(other for k in itertools.count(1) if (other := f"{log.name} ({k})") not in taken)
+            taken.add(name)
+        found.append(log if name == log.name else replace(log, name=name))
+    return tuple(found)
 
 
 def _signal(where: str, role: str, values: object) -> Array:

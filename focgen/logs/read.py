@@ -18,7 +18,7 @@ from focgen.logs.columns import run_instead, runs_without_name
 from focgen.logs.dialect import MISSING
 from focgen.logs.experiment import Experiment
 from focgen.logs.frames import Frame, is_frame, table_of
-from focgen.logs.given import checked_in_memory
+from focgen.logs.given import checked_in_memory, with_names_apart
 from focgen.logs.parts import Raw, experiments_of
 from focgen.logs.plausibility import hint
 from focgen.logs.roles import Roles, columns_named, scaled, taken_columns, without_unit
@@ -64,7 +64,7 @@ def read_logs(
     logs = each_of(paths)
     read = [log for log in logs if isinstance(log, Experiment)]
     if logs and len(read) == len(logs):
-        cut = tuple(checked_in_memory(log).between(first, last) for log in read)
+        cut = with_names_apart([checked_in_memory(log).between(first, last) for log in read])
         return in_session_order(cut) if _overlap(cut) else cut
     tables = tables_of(logs)
     if not tables:

@@ -1,8 +1,10 @@
 """Experiments that a program made by itself are looked at like a file.
 
 Red when one that no rig can be run on goes through, or is refused without its name, what is wrong and
-a remedy, and when a whole one is changed or copied.
+a remedy, when a whole one is changed or copied, and when two of one name give one result.
 """
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ import pytest
 from focgen import replay
 from focgen.errors import LogError
 from focgen.logs.experiment import Experiment
-from focgen.logs.given import checked_in_memory
+from focgen.logs.given import checked_in_memory, with_names_apart
 from focgen.rig.rig import Actuator, Rig, Signals
 
 U = np.repeat([0.0, 0.5, 0.2], 100)
@@ -64,3 +66,13 @@ def test_lists_and_whole_numbers_will_do():
     assert made["output"].dtype == float
     objects = checked_in_memory(logged(command=np.array(list(U), object)))
     np.testing.assert_array_equal(objects["command"], U)
+
+
+def test_experiments_of_one_name_are_told_apart():
+    """Results are told by name: of two of one name the first was lost."""
+    first, second, other = (replace(logged(), name=name) for name in ("e7", "e7", "e7 (1)"))
+    found = replay(RIG, [first, second, other])
+    assert list(found.logs) == ["e7 (2)", "e7 (3)", "e7 (1)"]
+    assert [log.name for log in with_names_apart(found.experiments)] == list(found.logs)
+    alone = (first, other)
+    assert all(a is b for a, b in zip(with_names_apart(alone), alone))
