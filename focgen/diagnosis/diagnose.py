@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from focgen.arguments import checked
 from focgen.control.files import ControllerLike, controller_from
 from focgen.control.units import check_one_unit
@@ -34,9 +36,10 @@ from focgen.replaced import check_own
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.initial import in_windows
 from focgen.rig.plausibility import doubts
-from focgen.rig.replay import after_session, experiments, with_known
+from focgen.rig.replay import after_session, experiments, replay, with_known
 from focgen.rig.response import with_loops
 from focgen.rig.rig import Rig
+from focgen.rig.stale_zero import with_zero_of
 from focgen.rig.turned import turn_of, with_its_way
 
 WRITTEN = ("diagnosis.json", "signals.json", "refitted.toml", "augmented.toml")  # beside the pictures
@@ -77,15 +80,18 @@ def diagnose(
         check_one_unit(nominal, which)
     session = after_session(nominal, usable(experiments(nominal, each, from_, to)))
     ran = None if which is None else check_controller(which, session)
+    as_given = nominal
+    nominal, stale = with_zero_of(nominal, session)
     nominal = with_its_way(nominal, session)
-    turn = turn_of(nominal)
+    turn, logged = turn_of(nominal), session
     if turn:
         session, nominal = tuple(turn.log(log, nominal) for log in session), turn.rig(nominal)
     diagnosis, asked = _diagnosed(nominal, session, ran, only, bootstrap)
     if turn:
-        logged = tuple(turn.back.log(log, nominal) for log in session)
         said = doubts(replace(turn.back.rig(nominal), known=()), logged)
         diagnosis = replace(turned_back(diagnosis, turn), warnings=said)
+    if stale:
+        diagnosis = _with_stale_zero(diagnosis, as_given, logged, stale)
     if out is not None:
         from focgen.diagnosis.write import write
 
@@ -126,6 +132,21 @@ def _diagnosed(
         drawn=drawn_of(rigs.refitted, evidence, session),
     )
     return diagnosis, proposed[1] if proposed else None
+
+
+def _with_stale_zero(
+    diagnosis: Diagnosis, rig: Rig, logs: tuple[Experiment, ...], warnings: tuple[str, ...]
+) -> Diagnosis:
+    """A diagnosis with a zero that the logs bear out, told against the ``rig`` as it was given."""
+    replayed = replay(rig, logs).logs.values()
+    given = float(np.sqrt(np.mean([found.rmse**2 for found in replayed])))
+    gof = diagnosis.gap.gof | {"as given": float(np.mean([found.gof for found in replayed]))}
+    return replace(
+        diagnosis,
+        verdict="parameters" if diagnosis.verdict == "none" else diagnosis.verdict,
+        gap=replace(diagnosis.gap, as_given=given, gof=gof),
+        warnings=(*warnings, *diagnosis.warnings),
+    )
 
 
 def _check_place(out: Path, given: Sequence[object]) -> None:

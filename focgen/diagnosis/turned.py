@@ -16,7 +16,7 @@ from focgen.rig.turned import Turn
 
 _WAYS = {"rising": "falling", "falling": "rising"}
 _COUNTED = "the {} below 0, or against the input: ceilings, widths and places count magnitudes there"
-_FROM = "the {} rests at {}, farther from 0 than the output moves: effects count it from there"
+_FROM = "the rig's own zero of the {} is {}, farther from 0 than it moves: effects count from there"
 
 
 def turned_back(diagnosis: Diagnosis, turn: Turn) -> Diagnosis:
@@ -73,8 +73,8 @@ def _said(diagnosis: Diagnosis, turn: Turn) -> list[str]:
     logged = [role for role in ROLES if role in signals.columns() and role != "reference"]
     roles = [role for role in logged if role in turn.roles]
     said = [_COUNTED.format(f"{listed(roles)} {'go' if len(roles) > 1 else 'goes'}")] if roles else []
-    for role in logged:
-        if lies := getattr(turn.origins, role, 0.0):
+    for role, lies in vars(turn.origins).items():
+        if lies:
             said.append(_FROM.format(role, f"{lies:.6g} {signals.unit_of(role) or ''}".rstrip()))
     return said
 

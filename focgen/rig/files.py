@@ -67,6 +67,7 @@ def read_rig(path: str | Path | Mapping[str, Any]) -> Rig:
         downwards=_downwards(top.section("signals", _WHICH)),
         origins=_origins(top.section("signals", _WHICH)),
     )
+    _check_origins(top, rig)
     top.table(TABLE)  # tells where the rig is from, and nothing of what it is
     top.done()
     return rig
@@ -124,6 +125,17 @@ def _origins(table: Table) -> Origins:
     found = Origins(**{role: given.number(role, 0.0) for role in vars(Origins())})
     given.done()
     return found
+
+
+def _check_origins(top: Table, rig: Rig) -> None:
+    """Raise RigError where effects count the curvature from a place that no rig of this kind rests at."""
+    if not rig.origins.curvature:
+        return
+    remedy = "remove the curvature from [signals.origins]"
+    if rig.actuator is None:
+        raise top.fail("signals", "counts the curvature from an origin, and there is no [actuator]", remedy)
+    if not np.isfinite(rig.sensor.dc_gain):
+        raise top.fail("signals", "counts the curvature from an origin, and the sensor integrates", remedy)
 
 
 def _column(table: Table, role: str) -> tuple[str | None, Scale | None]:

@@ -80,7 +80,8 @@ def replay(rig: RigLike, logs: Logs, from_: float | None = None, to: float | Non
         turned = _replayed(turn.rig(given), [turn.log(log, given) for log in session])
         made = {name: turn.back.signals(made) for name, made in turned.simulated.items()}
         told = turn.back.rig(present(turned.rig))
-        session = tuple(turn.back.log(log, given) for log in turned.experiments)
+        back = (turn.back.log(log, given) for log in turned.experiments)
+        session = tuple(replace(log, signals=was.signals, rows=was.rows) for log, was in zip(back, session))
         said = doubts(told, session)
         return replace(turned, simulated=made, rig=told, experiments=session, warnings=said)
     return _replayed(given, session)

@@ -189,8 +189,8 @@ class Rig:
     added to the sensor's reading, in the output's unit. ``downwards``: the roles whose signals effects count
     downwards, and ``origins``, where they count them from. Of no file are ``known``, effects
     (:class:`focgen.rig.placed.Placed`) that are run wherever the rig is, as its numbers are. Nor are
-    ``turned``, the roles whose signals it is run with the other sign of, and ``moved``, where they are run
-    from (:mod:`focgen.rig.turned`)."""
+    ``turned`` and ``moved``: what ``downwards`` and ``origins`` were of a rig whose signals are turned and
+    counted from there (:mod:`focgen.rig.turned`)."""
 
     name: str
     sample_time: float

@@ -60,7 +60,8 @@ class Turn:
         u, p, k, y = (self.signs[role] for role in ("command", "pressure", "curvature", "output"))
         spans = {role: self._span(span, role) for role, span in rig.ranges.stated().items()}
         lies = self.origins
-        zero = rig.zero - lies.output + (rig.sensor.dc_gain * lies.curvature if lies.curvature else 0.0)
+        seen = rig.sensor.dc_gain * lies.curvature if lies.curvature and rig.actuator else 0.0
+        zero = rig.zero - lies.output + seen
         return replace(
             rig,
             regulator=_times(rig.regulator, u * p),
@@ -140,10 +141,17 @@ def _origins(rig: Rig, logs: Sequence[Experiment]) -> Origins:
     gain = rig.sensor.dc_gain
     if any("output" not in log for log in logs) or not np.isfinite(gain):
         return Origins()
-    lies = 0.0 if rig.actuator is None else rig.actuator.offset
-    read = rig.zero + gain * lies
     moves = _FAR * float(np.ptp(np.concatenate([np.asarray(log["output"], float) for log in logs])))
-    return Origins(lies if abs(gain * lies) > moves else 0.0, read if abs(read) > moves else 0.0)
+    lies = 0.0 if rig.actuator is None else rig.actuator.offset
+    zero = rig.zero + gain * lies
+    return Origins(
+        _round(lies) if abs(gain * lies) > moves else 0.0, _round(zero) if abs(zero) > moves else 0.0
+    )
+
+
+def _round(zero: float) -> float:
+    """A zero as a file shows it well: what it is rounded by stays in the rig."""
+    return float(f"{zero:.9g}")
 
 
 def _sign(transfer: TransferFunction) -> int:

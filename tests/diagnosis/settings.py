@@ -18,7 +18,7 @@ CONSTANTS = {
     "fitting/predictability.py": ["_DAMPING", "_PERIODS", "_QUIETEST", "_RIDGES", "_SAMPLES"],
     "fitting/realign.py": ["_TAKEN"],
     "fitting/repeats.py": ["_ALIKE", "_AS_WELL", "_CELL", "_CLOSES", "_LATER", "_MOVED", "_ONE_SENSE"],
-    "hypotheses/blurred.py": ["_STAYS"],
+    "hypotheses/blurred.py": ["_SPIKE", "_STAYS"],
     "hypotheses/bootstrap.py": ["_RARE"],
     "hypotheses/input_covariance.py": ["_FLAT"],
     "hypotheses/converter.py": ["_EASED"],

@@ -32,7 +32,7 @@ def test_the_nearest_family_is_named_with_what_it_would_leave(monkeypatch):
     assert note.startswith(
         "curvature to output: 57% of what is left follows the curvature. With sensor_hysteresis"
     )
-    assert "the error would be 0.66 of that" in note
+    assert "0.66 of the error would stay" in note
 
 
 @pytest.mark.parametrize(

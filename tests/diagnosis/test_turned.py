@@ -118,6 +118,7 @@ def _check_rigs(found, rig, logs, folder):
     for trace, log in zip(found.drawn.traces, logs, strict=True):
         step = round(len(log) / len(trace.measured))
         np.testing.assert_allclose(trace.measured, log["output"][::step], atol=1e-12)
+        np.testing.assert_array_equal(replayed.experiments[logs.index(log)]["output"], log["output"])
         np.testing.assert_array_equal(trace.input, log["command"][::step])
 
 
@@ -145,8 +146,46 @@ def test_what_is_found_has_no_origin(effect, curvature, output, tmp_path):
         assert again.parameters[name].value == pytest.approx(number.value, rel=1e-4)
     assert found.gap.explained == pytest.approx(as_it_was.gap.explained, rel=1e-4)
     assert found.augmented.origins == Origins(curvature, curvature + output)
-    assert not found.refitted.origins and any(f"rests at {curvature + output:g}" in n for n in found.notes)
+    assert not found.refitted.origins
+    assert any(f"zero of the output is {curvature + output:g}" in note for note in found.notes)
     _check_rigs(found, *given, tmp_path)
+
+
+@pytest.mark.parametrize("zero, logged", [(32.0, 0.0), (-5.0, 0.0), (0.0, 293.15)])
+def test_a_zero_that_no_log_bears_out_is_the_logs_own(zero, logged):
+    """An offset left in from logs in kelvin, or one that is lacking: a ceiling was an obstacle
+    (0.95), or soft (0.95)."""
+    rig, logs = finger(stop=1.3)
+    as_it_was = diagnose(rig, logs, pictures=False)
+    _, far = lifted(rig, logs, 0.0, logged)
+    found = diagnose(replace(rig, zero=zero), far, pictures=False)
+    assert [[c.effect for c in cause.candidates] for cause in found.causes] == [
+        [c.effect for c in cause.candidates] for cause in as_it_was.causes
+    ]
+    assert found.gap.explained == pytest.approx(as_it_was.gap.explained, rel=1e-3)
+    assert found.gap.as_given == pytest.approx(abs(logged - zero), rel=0.03)
+    assert f"zero of the output is {zero:.4g}, and the logs lie by" in found.warnings[0]
+    assert found.refitted.zero == pytest.approx(logged, abs=0.05)
+
+
+def test_a_healthy_rig_with_a_zero_that_no_log_bears_out_has_parameters():
+    rig, logs = finger()
+    found = diagnose(replace(rig, zero=32.0), logs, pictures=False)
+    assert found.verdict == "parameters" and found.gap.as_given == pytest.approx(32.0, rel=0.01)
+    left = focgen.replay(found.refitted, logs)
+    assert np.sqrt(np.mean([log.rmse**2 for log in left.logs.values()])) < 1.2 * found.gap.floor
+
+
+def test_a_plan_has_no_origin():
+    rig, logs = finger()
+    far, lifted_logs = lifted(rig, logs, 32.0, 0.0)
+    bare = [log.without("output", "") for log in logs]
+    for given, other in (((), ()), (logs, lifted_logs), (bare, bare)):
+        here, there = plan(rig, given), plan(far, other)
+        assert [s.effect for s in here.effects] == [s.effect for s in there.effects]
+        assert [s.survives for s in there.effects] == pytest.approx(
+            [s.survives for s in here.effects], abs=1e-3
+        )
 
 
 def test_an_experiment_is_proposed_on_the_side_where_the_logs_are(tmp_path):

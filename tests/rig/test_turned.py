@@ -159,6 +159,7 @@ def test_a_rig_with_effects_says_by_itself_how_they_count():
         (293.0, 0.0, -0.01, Origins(293.0, -2.93)),
         (293.0, 3.0, -0.01, Origins(293.0)),
         (-293.0, 293.0, 1.0, Origins(curvature=-293.0)),
+        (293.15, 0.0, 0.1, Origins(293.15, 29.315)),  # and not 29.314999999999998
         (0.0, 1.5, 1.0, Origins()),
         (1.5, 0.0, 1.0, Origins()),
     ],
@@ -168,7 +169,8 @@ def test_where_a_rig_rests_counts_where_it_is_farther_from_0_than_the_output_mov
 ):
     read = TransferFunction([(sensor, 0.0)], [(0.2, 1.0), (1.0, 0.0)])
     rig = replace(rig_of(replace(ACTUATORS[1], offset=offset)), zero=zero, sensor=read)
-    logs = [Experiment("e", H, {"command": U, "output": np.r_[0.0, 2.0, 1.0, 0.5, 0.0]})]
+    rests = zero + sensor * offset
+    logs = [Experiment("e", H, {"command": U, "output": rests + np.r_[0.0, 2.0, 1.0, 0.5, 0.0]})]
     assert with_its_way(rig, logs).origins == lies
     assert not with_its_way(rig, [logs[0].without("output", "left out")]).origins
 
@@ -176,7 +178,8 @@ def test_where_a_rig_rests_counts_where_it_is_farther_from_0_than_the_output_mov
 def test_an_axis_has_a_zero_and_a_sensor_that_integrates_none():
     moves = TransferFunction([(2.0, 0.0)], [(0.1, 2.0), (1.0, 1.0)])
     axis = Rig("axis", H, Signals("t", "y", "u"), LinearActuator(moves, offset=50.0), zero=0.2)
-    assert with_its_way(axis, logs_of(LOGS["up"])).origins == Origins(50.0, 50.2)
+    stands = [replace(log, signals=log.signals | {"output": 50.0 + U}) for log in logs_of(LOGS["up"])]
+    assert with_its_way(axis, stands).origins == Origins(50.0, 50.2)
     counter = TransferFunction([(1.0, 0.0)], [(1.0, 1.0)])
     rig = replace(rig_of(replace(ACTUATORS[1], offset=50.0)), sensor=counter)
     assert not with_its_way(rig, logs_of(LOGS["up"])).origins
@@ -255,6 +258,19 @@ def test_a_file_that_counts_from_something_else_is_refused(tmp_path, said):
     text = (tmp_path / "rig.toml").read_text().replace("[signals]\n", f"[signals]\norigins = {said}\n")
     (tmp_path / "rig.toml").write_text(text)
     with pytest.raises(RigError, match="origins"):
+        focgen.read_rig(tmp_path / "rig.toml")
+
+
+@pytest.mark.parametrize(
+    "changed, said",
+    [
+        ({"actuator": None, "delays": Delays()}, r"no \[actuator\]"),
+        ({"sensor": TransferFunction([(1.0, 0.0)], [(1.0, 1.0)])}, "the sensor integrates"),
+    ],
+)
+def test_a_file_that_counts_the_curvature_from_nowhere_is_refused(changed, said, tmp_path):
+    focgen.write_rig(replace(ceiling(origins=Origins(curvature=3.0)), **changed), tmp_path / "rig.toml")
+    with pytest.raises(RigError, match=said):
         focgen.read_rig(tmp_path / "rig.toml")
 
 

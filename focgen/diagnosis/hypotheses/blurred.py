@@ -12,30 +12,27 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from scipy.optimize import brentq
 
 _HARMONICS = np.arange(1, 60)
-_AROUND = 17  # samples in which a reading is to stay where it is,
-_STAYS = 4.0  # to within so many steps
+_STAYS = 0.2  # of a step: by less the model moves from sample to sample where it stays
+_SPIKE = 4.0  # steps from one reading to the next, and times what is usual, are no noise that blurs
 _FEWEST = 50  # samples that stay
 _MOST = 1.0  # of a step: the largest noise looked for
 
 
-def noise_ahead(levels: np.ndarray, spans: Sequence[tuple[int, int]]) -> float:
-    """The root mean square, in steps, of the noise ahead of a converter that reads ``levels`` (n,), in steps,
-    at most 1; 0 where too few readings tell. White noise makes a reading go and come back. A signal that
-    moves on does not, so what it adds counts against noise, and so does what a coloured noise has in common.
+def noise_ahead(levels: np.ndarray, made: np.ndarray, spans: Sequence[tuple[int, int]]) -> float:
+    """The root mean square, in steps, of the noise ahead of a converter that reads ``levels`` (n,), where the
+    rig's model makes ``made`` (n,), in steps both; at most 1, and 0 where too few readings tell.
+
+    Told by readings of a rig that stays, or moves on slowly. White noise makes them go and come back. A slow
+    move does not, so what it adds counts against noise, and so does what a coloured noise has in common.
     """
-    back, stays = (np.concatenate(parts) for parts in zip(*(_back(levels[a:b]) for a, b in spans)))
-    seen = max(_mean(back), _mean(back[stays]))
+    back = np.concatenate([np.empty(0), *(_back(levels[a:b], made[a:b]) for a, b in spans)])
+    seen = float(np.mean(back)) if len(back) >= _FEWEST else 0.0
     if seen <= 0.0:
         return 0.0
     return _MOST if seen >= _variance(_MOST) else float(brentq(lambda s: _variance(s) - seen, 0.0, _MOST))
-
-
-def _mean(back: np.ndarray) -> float:
-    return float(np.mean(back)) if len(back) >= _FEWEST else 0.0
 
 
 def part_that_stays(noise: float) -> float:
@@ -55,9 +52,11 @@ def _variance(noise: float) -> float:
     return noise**2 + _curve(0.0) - _curve(noise)
 
 
-def _back(levels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Minus the product of neighbouring changes of ``levels`` (n,), of which the mean is the variance of
-    white noise; and where readings stay."""
-    span = maximum_filter1d(levels, _AROUND) - minimum_filter1d(levels, _AROUND)
-    change = np.diff(levels)
-    return -change[:-1] * change[1:], span[1:-1] <= _STAYS
+def _back(levels: np.ndarray, made: np.ndarray) -> np.ndarray:
+    """Minus the product of neighbouring changes of ``levels`` (n,), where ``made`` (n,) stays: its mean is
+    the variance of white noise."""
+    change, moved = np.diff(levels), np.abs(np.diff(made))
+    jumps = np.abs(change) > _SPIKE * np.maximum(1.0, np.median(np.abs(change)))
+    stays = (np.maximum(moved[:-1], moved[1:]) < _STAYS) & ~jumps[:-1] & ~jumps[1:]
+    back: np.ndarray = -(change[:-1] * change[1:])[stays]
+    return back

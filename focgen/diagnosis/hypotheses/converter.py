@@ -143,12 +143,18 @@ def converter_of(problem: Problem, candidates: Sequence[CandidateEffect]) -> Con
             scales = [problem.references.scale(p, slot) for p in candidate.form.parameters]
             entries = tuple(v / s for v, s in zip(values, scales))
             held = pinned(candidate, entries)
-            levels = _levels(problem, candidate, values)
-            noise = noise_ahead(levels / values[0], problem.segment.run.spans)
-            found = Converter(held, entries, values[0] / problem.segment.level_out, noise)
-            read = _is_sharp(problem, levels) or _is_read(problem, found, values)
-            return found if read else None
+            found = Converter(held, entries, values[0] / problem.segment.level_out)
+            if not (_is_sharp(problem, candidate, values) or _is_read(problem, found, values)):
+                return None
+            return replace(found, noise=_noise_ahead(problem, candidate, values))
     return None
+
+
+def _noise_ahead(problem: Problem, candidate: CandidateEffect, values: Values) -> float:
+    """The noise ahead of a converter, in its steps, by the model as given: where that stays, the rig does,
+    or moves slowly."""
+    step, made = values[0], problem.simulate(problem.nominal())
+    return noise_ahead(_levels(problem, candidate, values) / step, made / step, problem.segment.run.spans)
 
 
 def _levels(problem: Problem, candidate: CandidateEffect, values: Values) -> np.ndarray:
@@ -158,10 +164,10 @@ def _levels(problem: Problem, candidate: CandidateEffect, values: Values) -> np.
     return made
 
 
-def _is_sharp(problem: Problem, levels: np.ndarray) -> bool:
+def _is_sharp(problem: Problem, candidate: CandidateEffect, values: Values) -> bool:
     """Whether most readings are levels, but for the rounding of the file, or there are hardly more readings
     than levels: a finer converter behind the coarse one gives each level as its own nearest."""
-    y = problem.segment.y
+    y, levels = problem.segment.y, _levels(problem, candidate, values)
     few = len(np.unique(y)) <= _READINGS * len(np.unique(levels))
     return few or bool(_SHARP * np.median(np.abs(y - levels)) < np.ptp(y))
 

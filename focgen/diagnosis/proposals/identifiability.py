@@ -7,7 +7,7 @@ the nominal parameters, and how alike the survivors are, is known without a rig.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,16 +18,16 @@ from focgen.diagnosis.problem.excitation import excitation
 from focgen.diagnosis.problem.segments import cuts, make
 from focgen.diagnosis.proposals.limits import InputLimits
 from focgen.diagnosis.proposals.menu import menu
-from focgen.logs.experiment import Experiment
+from focgen.logs.experiment import ROLES, Experiment
 from focgen.logs.read import Logs, each_of
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.effects import Excitation, Run, library
 from focgen.rig.engine import Chain
-from focgen.rig.replay import experiments, with_known
+from focgen.rig.replay import experiments, simulate_session, with_known
 from focgen.rig.response import check_bounded, integrations, longest, response_time
 from focgen.rig.rig import Rig
 from focgen.rig.stages import LEAVES
-from focgen.rig.turned import turn_of, with_its_way
+from focgen.rig.turned import Turn, turn_of, with_its_way
 
 ALIKE = 0.9  # cosine beyond which two effects cannot be told apart
 HIDDEN = 0.1  # surviving share below which an effect hides in the nominal parameters
@@ -77,12 +77,27 @@ def plan(rig: RigLike, logs: Logs = ()) -> Plan:
     nominal = with_its_way(nominal, logged or _reach(nominal))
     turn = turn_of(nominal)
     nominal, logged = turn.rig(nominal), tuple(turn.log(log, nominal) for log in logged)
-    session = logged or _menu(nominal)
+    nominal, session = _from_its_zero(nominal, logged or _menu(nominal))
     roles = cuts(session)
     response = response_time(nominal, session[0].sample_time, longest(session))
     seen = excitation([s[roles[0]] for s in session], session[0].sample_time, response)
     found = [survival for a, b in pairwise(roles) for survival in _segment(nominal, session, a, b, seen)]
     return Plan(tuple(s.name for s in session), tuple(found))
+
+
+def _from_its_zero(rig: Rig, logs: tuple[Experiment, ...]) -> tuple[Rig, tuple[Experiment, ...]]:
+    """The rig and its logs as a diagnosis would run them, with what it makes where none is logged."""
+    seen = logs if all("output" in log for log in logs) else _made(rig, logs)
+    if rig.moved or rig.effects:
+        return rig, seen
+    turn = Turn(dict.fromkeys(ROLES, 1), with_its_way(rig, seen).origins)
+    return turn.rig(rig), tuple(turn.log(log, rig) for log in seen)
+
+
+def _made(rig: Rig, logs: tuple[Experiment, ...]) -> tuple[Experiment, ...]:
+    """The logs with the outputs that the rig makes of their inputs."""
+    made = simulate_session(rig, logs)
+    return tuple(replace(log, signals={**log.signals, "output": y["output"]}) for log, y in zip(logs, made))
 
 
 def _reach(rig: Rig) -> tuple[Experiment, ...]:

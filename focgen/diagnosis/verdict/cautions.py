@@ -88,10 +88,10 @@ def the_rest(summary: Summary) -> Iterator[str]:
                 "as where it rests, which noise is not: something else acts there, which it may stand for"
             )
         elif (further := _further(e)) is not None:
-            follows = f"{e.amiss:.0%} of what is left follows the {e.segment.entry}"
+            follows = f"{_within(e)}: {e.amiss:.0%} of what is left follows the {e.segment.entry}"
             yield (
-                f"{_within(e)}: {follows}. With {further} as well the error would be {e.beside[further]:.2g} "
-                "of that: it may be there, too, or the form of what was found lacks as much"
+                f"{follows}. With {further} as well {e.beside[further]:.2g} of the error would stay: "
+                "it may be there, too, or what was found does not go quite as the library has it"
             )
 
 
