@@ -12,7 +12,7 @@ from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.problem import CandidateEffect
 
 NEAR = 6.0  # nats: of families that are further behind no further form is asked
-_BEHIND = 50.0  # nats, with nominal parameters as they are: so far behind none is the likeliest
+_BEHIND = 50.0  # nats, whatever nominal parameters cost: so far behind none is the likeliest
 
 
 def prior(candidate: CandidateEffect, beside: Sequence[CandidateEffect]) -> float:
@@ -55,7 +55,7 @@ def likeliest(ground: Ground, tried: Sequence[Fit]) -> tuple[Fit, float]:
     """Of candidates the one of the highest posterior odds over nothing more, and those, in nats, by what it
     explains: nominal parameters that come closer to those given choose among effects, and ask for none. So
     the likeliest of those that something is explained by, where there is one."""
-    rough = [ground.roughly(f) for f in tried]
+    rough = [ground.roughly(f) + f.prior_penalty for f in tried]  # they may be kept closer to those given
     tried = [f for f, nats in zip(tried, rough) if nats > max(rough) - _BEHIND]
     last, beside = [f.problem.candidates[-1] for f in tried], ground.base.problem.candidates
     odds = [ground.odds(f) + prior(c, beside) for f, c in zip(tried, last)]
