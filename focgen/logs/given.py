@@ -40,8 +40,8 @@ def checked_in_memory(log: Experiment) -> Experiment:
         raise LogError(where, what, "give as many of each")
     if not count:
         raise LogError(where, "has no samples", _REMEDY)
-    same = all(signals[role] is log.signals[role] for role in signals)
-    return log if same else replace(log, signals=signals)
+    same = isinstance(log.name, str) and all(signals[role] is log.signals[role] for role in signals)
+    return log if same else replace(log, name=where, signals=signals)
 
 
 def with_names_apart(logs: Sequence[Experiment]) -> tuple[Experiment, ...]:

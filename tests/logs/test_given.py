@@ -74,5 +74,7 @@ def test_experiments_of_one_name_are_told_apart():
     found = replay(RIG, [first, second, other])
     assert list(found.logs) == ["e7 (2)", "e7 (3)", "e7 (1)"]
     assert [log.name for log in with_names_apart(found.experiments)] == list(found.logs)
+    numbers = replay(RIG, [replace(logged(), name=name) for name in (1, "1", ["a"])])
+    assert list(numbers.logs) == ["1 (1)", "1 (2)", "['a']"]
     alone = (first, other)
     assert all(a is b for a, b in zip(with_names_apart(alone), alone))

@@ -12,7 +12,7 @@ import pytest
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.replay import simulate_session
-from focgen.rig.rig import LinearActuator, Rig, Signals
+from focgen.rig.rig import UNITY, LinearActuator, Rig, Signals
 from focgen.rig.stale_zero import with_zero_of
 
 H = 0.05
@@ -65,15 +65,43 @@ def test_a_rig_held_around_a_working_point_keeps_its_zero(zero):
     assert with_zero_of(rig, cut)[0] is rig
 
 
+@pytest.mark.parametrize("gain", [-2.0, 4.1, 6.0])
+@pytest.mark.parametrize("u", [(10.0, 10.1, 9.9, 10.05, 10.0), (0.0, 10.0, 10.0, 10.0, 8.0, 10.0, 10.0)])
+def test_a_gain_or_a_sign_that_is_wrong_is_no_zero(gain, u):
+    """Held high all the time it is as far off."""
+    rig = rig_of(gain=2.0)
+    logs = [log.between(4.0, None) for log in logs_of(rig_of(gain=gain), u)]
+    assert with_zero_of(rig, logs)[0] is rig
+
+
+@pytest.mark.parametrize("after", [(0.0, 0.2, 0.0, 0.2), (0.0, 0.0, 0.0, 0.0)])
+@pytest.mark.parametrize("order", [1.0, 0.5])
+def test_a_rig_that_comes_to_rest_keeps_its_zero(order, after):
+    """It was held for 40 s before the log, and moves by less than it has to go yet."""
+    slow = LinearActuator(TransferFunction([(2.0, 0.0)], [(20.0**order, order), (1.0, 0.0)]))
+    rig = replace(rig_of(), actuator=slow)
+    logs = [log.between(41.0, None) for log in logs_of(rig, (10.0,) * 10 + after)]
+    assert with_zero_of(rig, logs)[0] is rig
+
+
 def test_a_curvature_has_a_zero_of_its_own():
-    logs = logs_of(rig_of(offset=293.0), keep=("curvature", "output"))
+    both = ("curvature", "output")
+    moved = {"curvature": 293.0, "output": 20.0}  # in kelvin, and in degrees beside
+    logs = [
+        replace(log, signals=log.signals | {role: log[role] - 20.0 + moved[role] for role in both})
+        for log in logs_of(rig_of(offset=20.0), keep=both)
+    ]
     now, said = with_zero_of(rig_of(offset=20.0), logs)
-    assert now.actuator.offset == pytest.approx(293.0, abs=0.02) and now.zero == 0.0
+    assert (now.actuator.offset, now.zero) == pytest.approx((293.0, -273.0), abs=0.02)
     assert len(said) == 1 and "zero of the curvature is 20" in said[0]
-    now, said = with_zero_of(rig_of(offset=20.0), logs_of(rig_of(offset=293.0)))
+    now, said = with_zero_of(rig_of(offset=20.0), logs_of(rig_of(offset=293.0), keep=both))
+    assert (now.actuator.offset, now.zero) == pytest.approx((293.0, 0.0), abs=0.03) and len(said) == 2
+    now, said = with_zero_of(rig_of(20.0, sensor=UNITY), logs_of(rig_of(20.0, 273.0, UNITY), keep=both))
+    assert now.actuator.offset == 20.0 and now.zero == pytest.approx(273.0, abs=0.02) and len(said) == 1
+    now, _ = with_zero_of(rig_of(20.0, sensor=UNITY), logs_of(rig_of(293.0, sensor=UNITY)))
+    assert now.actuator.offset == pytest.approx(293.0, abs=0.02) and now.zero == 0.0
+    now, _ = with_zero_of(rig_of(offset=20.0), logs_of(rig_of(offset=293.0)))
     assert now.actuator.offset == 20.0 and now.zero == pytest.approx(273.0, abs=0.02)
-    now, _ = with_zero_of(rig_of(offset=20.0, sensor=lag(1.0, 0.0)), logs_of(rig_of(offset=293.0)))
-    assert now.actuator.offset + now.zero == pytest.approx(293.0, abs=0.2)
 
 
 def test_what_adds_up_or_has_effects_says_its_zero_itself():

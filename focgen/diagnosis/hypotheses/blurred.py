@@ -56,6 +56,8 @@ def _back(levels: np.ndarray, made: np.ndarray) -> np.ndarray:
     """Minus the product of neighbouring changes of ``levels`` (n,), where ``made`` (n,) stays: its mean is
     the variance of white noise."""
     change, moved = np.diff(levels), np.abs(np.diff(made))
+    if len(change) < 2:
+        return np.empty(0)
     jumps = np.abs(change) > _SPIKE * np.maximum(1.0, np.median(np.abs(change)))
     stays = (np.maximum(moved[:-1], moved[1:]) < _STAYS) & ~jumps[:-1] & ~jumps[1:]
     back: np.ndarray = -(change[:-1] * change[1:])[stays]

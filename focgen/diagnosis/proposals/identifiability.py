@@ -27,6 +27,7 @@ from focgen.rig.replay import experiments, simulate_session, with_known
 from focgen.rig.response import check_bounded, integrations, longest, response_time
 from focgen.rig.rig import Rig
 from focgen.rig.stages import LEAVES
+from focgen.rig.stale_zero import with_zero_of
 from focgen.rig.turned import Turn, turn_of, with_its_way
 
 ALIKE = 0.9  # cosine beyond which two effects cannot be told apart
@@ -74,6 +75,7 @@ def plan(rig: RigLike, logs: Logs = ()) -> Plan:
     """
     nominal, each = with_known(rig_of(rig)), each_of(logs)
     logged = experiments(nominal, each) if each else ()
+    nominal, _ = with_zero_of(nominal, logged) if logged else (nominal, ())
     nominal = with_its_way(nominal, logged or _reach(nominal))
     turn = turn_of(nominal)
     nominal, logged = turn.rig(nominal), tuple(turn.log(log, nominal) for log in logged)
@@ -91,13 +93,14 @@ def _from_its_zero(rig: Rig, logs: tuple[Experiment, ...]) -> tuple[Rig, tuple[E
     if rig.moved or rig.effects:
         return rig, seen
     turn = Turn(dict.fromkeys(ROLES, 1), with_its_way(rig, seen).origins)
-    return turn.rig(rig), tuple(turn.log(log, rig) for log in seen)
+    moved = replace(turn.rig(rig), downwards=rig.downwards, turned=rig.turned)  # as it was turned before
+    return moved, tuple(turn.log(log, rig) for log in seen)
 
 
 def _made(rig: Rig, logs: tuple[Experiment, ...]) -> tuple[Experiment, ...]:
-    """The logs with the outputs that the rig makes of their inputs."""
-    made = simulate_session(rig, logs)
-    return tuple(replace(log, signals={**log.signals, "output": y["output"]}) for log, y in zip(logs, made))
+    """The logs, with what the rig makes of their inputs where they lack the output."""
+    made = ({"output": y["output"]} for y in simulate_session(rig, logs))
+    return tuple(replace(log, signals={**y, **log.signals}) for log, y in zip(logs, made))
 
 
 def _reach(rig: Rig) -> tuple[Experiment, ...]:
