@@ -1,8 +1,8 @@
 """A rig whose zero is in none of its logs: of another unit, as kelvin, or of a gauge zeroed since.
 
 What the rig's file says of its zero is a claim, and the logs show where it lies. One that is farther off than
-everything that the rig moves by, all the time, tells nothing. Effects would be looked for around it: a ceiling
-was an obstacle at 0.95, and behind a zero of 293 K a bent curve.
+everything that the rig moves by, all the time, tells nothing. Effects would be looked for around it: a
+ceiling was an obstacle at 0.95, and behind a zero of 293 K a bent curve.
 """
 
 from __future__ import annotations
