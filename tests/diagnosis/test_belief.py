@@ -381,6 +381,9 @@ def test_beside_an_effect_what_is_likelier_the_nominal_chain_is_not_named(monkey
     assert left_out(faint) == left_out(clear) == []
     assert left_out(faint, clear) == [faint] and left_out(fainter, faint) == [fainter]
     assert left_out(faint, clear, unknown=True) == []
+    even = SimpleNamespace(rivals=[replace(_rival("softening", 300.0, 1.4), form=2.0)])
+    assert nominal_instead(even.rivals[0]) == 0.5
+    assert left_out(even) == [] and left_out(even, clear) == [even]
 
 
 @pytest.mark.parametrize("part, off", [(0.25, True), (0.6, False)])

@@ -19,11 +19,12 @@ from focgen.present import present
 
 
 def likelier_nominal(explanations: Sequence[Explanation]) -> list[tuple[Explanation, Cause]]:
-    """The causes, of several in all, that are likelier the nominal chain, or nothing at all; the one that is
-    so least stays. What is in a segment that is unknown with it does not count."""
+    """The causes, of several in all, that are as likely the nominal chain, or nothing at all, as an effect:
+    an even chance is no second fault. The one that is so least stays. What is in a segment that is unknown
+    with it does not count."""
     every = [(e, c) for e in explanations if e.causes and not is_unknown(e) for c in e.causes]
     every.sort(key=lambda each: _in_vain(each[1]))
-    return [(e, c) for e, c in every[1:] if _in_vain(c) > 0.5]
+    return [(e, c) for e, c in every[1:] if _in_vain(c) >= 0.5]
 
 
 def _in_vain(cause: Cause) -> float:
