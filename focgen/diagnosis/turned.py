@@ -107,10 +107,10 @@ def _mean(mean: Mean, entry: str, exit: str, back: Turn) -> Mean:
     if mean.over == "time":
         return replace(mean, mean=sign * mean.mean)
     place = back.signal(mean.place, entry) if mean.over == "level" else back.signs[entry] * mean.place
+    made = replace(mean, place=place, mean=sign * mean.mean)
     if back.signs[entry] > 0:
-        return replace(mean, place=place, mean=sign * mean.mean)
-    way = _WAYS.get(mean.way, mean.way)
-    return replace(mean, way=way, place=place[::-1], mean=sign * mean.mean[::-1])
+        return made
+    return replace(made, way=_WAYS.get(made.way, made.way), place=made.place[::-1], mean=made.mean[::-1])
 
 
 def _residual(residual: Residual, entry: str, exit: str, back: Turn) -> Residual:

@@ -51,6 +51,6 @@ def write(
 def _next(choice: Choice) -> str:
     """The input of the experiment that is proposed, as a table: seconds, and the input in the log's unit."""
     per = choice.limits.coarse
-    values = np.repeat(choice.sign * choice.input + 0.0, per)
+    values = np.repeat(choice.logged, per)
     times = np.arange(len(values)) * (choice.limits.h / per)
     return "time_s,input\n" + "".join(f"{t:.9g},{u:.7g}\n" for t, u in zip(times, values))

@@ -74,7 +74,7 @@ class _Loop:
         self.regulator = OnlineConvolution(chain.pressure[:samples], columns, samples)
         self.plant = OnlineConvolution(chain.output[:samples], columns, samples)
         self.drive = np.zeros((samples, chain.substeps + 1, columns))
-        self.peak = np.full(columns, start.pressure)
+        self.ends = np.full((2, columns), start.pressure)  # the highest pressure, and the lowest
 
     def run(self, stepper: Stepper, reference: Array, curvature: bool) -> LoopRun:
         command = np.full(reference.shape, self.start.command)
@@ -92,12 +92,15 @@ class _Loop:
             if k + 1 < len(reference):
                 pressure[k + 1], output[k + 1] = ahead
         bent = self._curvature() if curvature else None
-        return LoopRun(self.chain.sample_time, reference, command, pressure, bent, output, self.peak)
+        return LoopRun(
+            self.chain.sample_time, reference, command, pressure, bent, output, farthest(self.ends)
+        )
 
     def _advance(self, k: int, command: Array) -> tuple[Array, Array]:
         """Hold ``command`` over sample k; return pressure and output at its end."""
         pressure = self.start.pressure + self.regulator.step(command[None] - self.start.command)
-        self.peak = farthest(np.vstack([self.peak[None], pressure]))
+        np.maximum(self.ends[0], pressure.max(axis=0), out=self.ends[0])
+        np.minimum(self.ends[1], pressure.min(axis=0), out=self.ends[1])
         inside = pressure[: self.chain.substeps + 1]  # the last row may be one of what is measured, late
         self.drive[k] = self.actuator.drive(inside) - self.rest_drive
         return pressure[-1], self.start.output + self.plant.step(self.drive[k])[0]

@@ -291,8 +291,9 @@ def _starts_at_rest(rig: Rig, log: Experiment, earlier: Sequence[Experiment], ro
 
 def _lying(rig: Rig) -> dict[str, float]:
     """Where signals of a rig at rest lie, by role, that are not 0 there."""
-    offset = rig.actuator.offset if rig.actuator is not None and not rig.integrator else 0.0
-    return {"curvature": offset, "output": rig.zero + (rig.sensor.dc_gain * offset if offset else 0.0)}
+    if rig.integrator:
+        return {"curvature": 0.0, "output": rig.zero}
+    return {role: rig.own_zero(role) for role in ("curvature", "output")}
 
 
 def _largest(log: Experiment, earlier: Sequence[Experiment], role: str, at: float = 0.0) -> float:

@@ -218,6 +218,13 @@ class Rig:
         """A value of a role's signal, as it was logged."""
         return self.sign(role) * value + float(getattr(self.moved, role, 0.0))
 
+    def own_zero(self, role: str) -> float:
+        """Where its offsets put the curvature, or the output: what has no integrator rests there."""
+        offset = self.actuator.offset if self.actuator is not None else 0.0
+        if role == "curvature":
+            return offset
+        return self.zero + (self.sensor.dc_gain * offset if offset else 0.0)
+
     @property
     def integrator(self) -> str | None:
         """The first stage that goes on under a constant input, as a pump's volume or an axis does; None where

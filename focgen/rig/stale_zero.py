@@ -26,13 +26,13 @@ _SAID = (
 def with_zero_of(rig: Rig, logs: Sequence[Experiment]) -> tuple[Rig, tuple[str, ...]]:
     """The rig with zeros that the logs bear out, and a warning for each that they did not. What a rig that
     integrates, or has effects, says stays."""
-    if rig.effects or rig.integrator or not np.isfinite(rig.sensor.dc_gain):
+    if not logs or rig.effects or rig.integrator or not np.isfinite(rig.sensor.dc_gain):
         return rig, ()
     said: list[str] = []
     for role in ("curvature", "output"):
         off = _off(rig, logs, role) if all(role in log for log in logs) else 0.0
         if off:
-            unit, was = rig.signals.unit_of(role) or "", _rests(rig, role)
+            unit, was = rig.signals.unit_of(role) or "", rig.own_zero(role)
             numbers = (f"{x:.4g} {unit}".rstrip() for x in (was, abs(off), was + off))
             said.append(_SAID.format(role, *numbers))
             rig = _moved(rig, role, off, "curvature" in logs[0])
@@ -45,15 +45,9 @@ def _off(rig: Rig, logs: Sequence[Experiment], role: str) -> float:
     made = np.concatenate([signals[role] for signals in simulate_session(rig, logs, continues=False)])
     read = np.concatenate([np.asarray(log[role], float) for log in logs])
     off = float(np.median(read - made))
-    moves = max(float(np.ptp(read)), float(np.max(np.abs(made - _rests(rig, role)))))
+    moves = max(float(np.ptp(read)), float(np.max(np.abs(made - rig.own_zero(role)))))
     steady = float(np.std(read - made)) < _ALIKE * float(np.std(made))
     return off if np.isfinite(off) and abs(off) > moves and steady else 0.0
-
-
-def _rests(rig: Rig, role: str) -> float:
-    """Where a signal of a rig at rest lies."""
-    offset = 0.0 if rig.actuator is None else rig.actuator.offset
-    return offset if role == "curvature" else rig.zero + rig.sensor.dc_gain * offset
 
 
 def _moved(rig: Rig, role: str, off: float, curvature_logged: bool) -> Rig:

@@ -142,8 +142,7 @@ def _origins(rig: Rig, logs: Sequence[Experiment]) -> Origins:
     if any("output" not in log for log in logs) or not np.isfinite(gain):
         return Origins()
     moves = _FAR * float(np.ptp(np.concatenate([np.asarray(log["output"], float) for log in logs])))
-    lies = 0.0 if rig.actuator is None else rig.actuator.offset
-    zero = rig.zero + gain * lies
+    lies, zero = rig.own_zero("curvature"), rig.own_zero("output")
     return Origins(
         _round(lies) if abs(gain * lies) > moves else 0.0, _round(zero) if abs(zero) > moves else 0.0
     )

@@ -144,17 +144,18 @@ def converter_of(problem: Problem, candidates: Sequence[CandidateEffect]) -> Con
             entries = tuple(v / s for v, s in zip(values, scales))
             held = pinned(candidate, entries)
             found = Converter(held, entries, values[0] / problem.segment.level_out)
-            if not (_is_sharp(problem, candidate, values) or _is_read(problem, found, values)):
+            levels = _levels(problem, candidate, values)
+            if not (_is_sharp(problem, levels) or _is_read(problem, found, levels)):
                 return None
-            return replace(found, noise=_noise_ahead(problem, candidate, values))
+            return replace(found, noise=_noise_ahead(problem, levels, values[0]))
     return None
 
 
-def _noise_ahead(problem: Problem, candidate: CandidateEffect, values: Values) -> float:
-    """The noise ahead of a converter, in its steps, by the model as given: where that stays, the rig does,
-    or moves slowly."""
-    step, made = values[0], problem.simulate(problem.nominal())
-    return noise_ahead(_levels(problem, candidate, values) / step, made / step, problem.segment.run.spans)
+def _noise_ahead(problem: Problem, levels: np.ndarray, step: float) -> float:
+    """The noise ahead of a converter that reads ``levels`` (n,), in its steps, by the model as given: where
+    that stays, the rig does, or moves slowly."""
+    made = problem.simulate(problem.nominal())
+    return noise_ahead(levels / step, made / step, problem.segment.run.spans)
 
 
 def _levels(problem: Problem, candidate: CandidateEffect, values: Values) -> np.ndarray:
@@ -164,18 +165,18 @@ def _levels(problem: Problem, candidate: CandidateEffect, values: Values) -> np.
     return made
 
 
-def _is_sharp(problem: Problem, candidate: CandidateEffect, values: Values) -> bool:
+def _is_sharp(problem: Problem, levels: np.ndarray) -> bool:
     """Whether most readings are levels, but for the rounding of the file, or there are hardly more readings
     than levels: a finer converter behind the coarse one gives each level as its own nearest."""
-    y, levels = problem.segment.y, _levels(problem, candidate, values)
+    y = problem.segment.y
     few = len(np.unique(y)) <= _READINGS * len(np.unique(levels))
     return few or bool(_SHARP * np.median(np.abs(y - levels)) < np.ptp(y))
 
 
-def _is_read(problem: Problem, found: Converter, values: Values) -> bool:
-    """Whether the levels are the reading's and no rests of the rig."""
+def _is_read(problem: Problem, found: Converter, levels: np.ndarray) -> bool:
+    """Whether the ``levels`` (n,) are the reading's and no rests of the rig."""
     nominal = fit(problem, problem.nominal(), WHITE, _REFITTED)
-    if _moves_on(nominal, _levels(problem, found.candidate, values)):
+    if _moves_on(nominal, levels):
         return True
     both, _ = found.beside(nominal, nominal, (), WHITE)
     return rms(both.weighed) < NUMBERS.unlikely * rms(nominal.weighed)

@@ -75,7 +75,7 @@ def plan(rig: RigLike, logs: Logs = ()) -> Plan:
     """
     nominal, each = with_known(rig_of(rig)), each_of(logs)
     logged = experiments(nominal, each) if each else ()
-    nominal, _ = with_zero_of(nominal, logged) if logged else (nominal, ())
+    nominal, _ = with_zero_of(nominal, logged)
     nominal = with_its_way(nominal, logged or _reach(nominal))
     turn = turn_of(nominal)
     nominal, logged = turn.rig(nominal), tuple(turn.log(log, nominal) for log in logged)

@@ -39,6 +39,11 @@ class Choice:
         return self.limits.of(self.levels, self.share)
 
     @property
+    def logged(self) -> np.ndarray:
+        """The input (n,) as the rig's logs have it."""
+        return self.sign * self.input + 0.0  # no −0
+
+    @property
     def seconds(self) -> float:
         """How long it takes."""
         return len(self.levels) * self.limits.h

@@ -53,18 +53,8 @@ def propose(
                 if len(rivals) > 1 and cause.rivals[0].effect == names[0]:
                     out = [r for r in cause.rivals if r.effect not in names]
                     asked = _Question(e, tuple(rivals[: 1 + _RIVALS]), tuple(out[:_RIVALS]))
-                    return _as_logged(rig, _answered(rig, logs, explanations, asked))
+                    return _answered(rig, logs, explanations, asked)
     return None
-
-
-def _as_logged(
-    rig: Rig, answer: tuple[NextExperiment, Choice] | None
-) -> tuple[NextExperiment, Choice] | None:
-    """An answer whose input has the sign that the rig's logs have."""
-    if answer is None:
-        return None
-    said, choice = answer
-    return said, replace(choice, sign=rig.sign(str(said.inputs["entry"])))
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,8 +85,7 @@ class _Asked:
 
     def said(self, rig: Rig) -> str:
         """It in words, with the rig's units."""
-        limits, signals = self.choice.limits, rig.signals
-        made = rig.sign(self.entry) * self.choice.input + 0.0  # no −0
+        limits, made, signals = self.choice.limits, self.choice.logged, rig.signals
         unit = signals.unit_of(self.entry)
         ends = f"from {made.min():.4g} to {made.max():.4g} {unit}".strip()
         parts = [f"{self.choice.what}, on the {self.entry} {ends}"]
@@ -157,9 +146,10 @@ def _answered(
     if (best := _best(tiers)) is None:
         return None
     row = _in_a_row(best[1], tiers, lambda choice: _holds(choice, rigs, bounds))
-    asked = _Asked(row.choice, entry, row.stage, bounds, limits.rate)
+    choice = replace(row.choice, sign=rig.sign(entry))
+    asked = _Asked(choice, entry, row.stage, bounds, limits.rate)
     value = float(min(row.least(_telling(tiers)), _MOST))
-    return _proposed(rig, e, rivals, value, asked), row.choice
+    return _proposed(rig, e, rivals, value, asked), choice
 
 
 def _with_a_further_signal(
@@ -274,7 +264,7 @@ def _showing(
 def _proposed(
     rig: Rig, e: Explanation, rivals: Sequence[Rival], value: float, asked: _Asked
 ) -> NextExperiment:
-    names, made = [r.effect for r in rivals], rig.sign(asked.entry) * asked.choice.input + 0.0
+    names, made = [r.effect for r in rivals], asked.choice.logged
     return NextExperiment(
         f"telling {names[0]} from {' and '.join(names[1:])}{_lacking(e, names)}",
         asked.said(rig),
