@@ -52,6 +52,15 @@ def test_the_papers_frozen_loop_settles_as_stated(pressure, settling):
     assert found.overshoot_pct < 0.1
 
 
+def test_a_peak_is_the_pressure_farthest_from_0():
+    """A vacuum's is its lowest, which an overshoot passes between and beyond what the run ends at."""
+    ringing = TransferFunction([(1.0, 0.0)], [(0.01, 2.0), (0.06, 1.0), (1.0, 0.0)])
+    rig = replace(paper_rig(), regulator=ringing)
+    run = run_loop(chain(rig, 0.05, 60), Constant([1.0, -1.0]), np.zeros((60, 2)), REST, delay=0)
+    up, down = run.peak_pressure
+    assert up == -down > run.pressure[:, 0].max() > 1.1
+
+
 def test_the_papers_frozen_loop_settles_in_1_36_s_on_average():
     times = [
         measure_step(
