@@ -15,7 +15,7 @@ from focgen.errors import FitError, LogError
 from focgen.fractional.simulation import Convolution
 from focgen.fractional.transfer import TransferFunction
 from focgen.identification.kernel import Kernels
-from focgen.logs.between import Course, course_of, jumps_of, noise_level
+from focgen.logs.between import Between, Course, course_of, jumps_of, noise_level
 from focgen.logs.experiment import Experiment
 from focgen.logs.feedback import unlogged_reference
 from focgen.rig.rig import UNITY, Rig
@@ -111,7 +111,7 @@ class Excitation:
     def stepped(self) -> Driven:
         """A drive that steps to 1 at the first sample and stays for as long as pasts are looked back to."""
         ones = np.ones((1, len(self) + self.looked_back))
-        course = course_of(ones, np.zeros(ones.shape[1], bool), held=True)
+        course = course_of(ones, np.zeros(ones.shape[1], bool), Between.HELD)
         return Driven(course if self.sensor == UNITY else through(self.sensor, course, self.step))
 
     @property
@@ -181,8 +181,9 @@ def prepare(experiment: Experiment, rig: Rig, powers: int = 1, before: float | N
     first sample (None: as at the first sample). Raises LogError where a signal is constant or too short.
     """
     _check(experiment)
-    pressure, level_before, jumps, held, role = _input(experiment, rig, before)
-    course = course_of(np.array([pressure**m - level_before**m for m in range(1, powers + 1)]), jumps, held)
+    pressure, level_before, jumps, between, role = _input(experiment, rig, before)
+    above = np.array([pressure**m - level_before**m for m in range(1, powers + 1)])
+    course = course_of(above, jumps, between)
     fitted = "curvature" if "curvature" in experiment else "output"
     sensor = rig.sensor if fitted == "output" else UNITY
     if sensor != UNITY:
@@ -256,23 +257,27 @@ def is_driven(experiment: Experiment) -> bool:
     )
 
 
-def _input(experiment: Experiment, rig: Rig, before: float | None) -> tuple[Array, float, Bools, bool, str]:
-    """The actuator's input: (samples, value before them, where it jumps, whether it is held, its role)."""
+def _input(
+    experiment: Experiment, rig: Rig, before: float | None
+) -> tuple[Array, float, Bools, Between, str]:
+    """The actuator's input: (samples, value before them, where it jumps, what it does between, its role)."""
     if "pressure" in experiment:
         values = experiment["pressure"]
         rest = _rest_of(values) if before is None else before
         if before is None:
             values = np.concatenate([[rest], values[1:]])  # the first sample's noise is no step
-        return values, rest, jumps_of(values), False, "pressure"
-    command = experiment["command"]
+        return values, rest, jumps_of(values), Between.SMOOTH, "pressure"
+    command, between = experiment["command"], Between.HELD if rig.between is None else rig.between
     rest = float(command[0]) if before is None else before
+    none = np.zeros(len(command), bool)
     if rig.regulator == UNITY:
-        return command, rest, np.ones(len(command), bool), True, "command"
+        return command, rest, none, between, "command"
     gain = rig.regulator.dc_gain
     if not np.isfinite(gain):
         raise FitError("regulator", "integrates, so it has no rest to start from", "log the pressure")
-    moved = _run("regulator", rig.regulator, experiment.sample_time, "zero", command - rest)
-    return gain * rest + moved, gain * rest, np.zeros(len(command), bool), False, "command"
+    hold: Literal["zero", "linear"] = "zero" if between == Between.HELD else "linear"
+    moved = _run("regulator", rig.regulator, experiment.sample_time, hold, command - rest)
+    return gain * rest + moved, gain * rest, none, Between.SMOOTH, "command"
 
 
 def _run(

@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from focgen.arguments import checked
+from focgen.arrays import Array
 from focgen.custody import identified_from
 from focgen.errors import FitError, LogError, check_choice
+from focgen.identification.between_samples import likeliest_way, ways_of
 from focgen.identification.caveats import effects_left_out, warnings_of
 from focgen.identification.digits import told_gain, told_value
 from focgen.identification.excitation import Excitation, is_driven, possible_rests, prepare
@@ -29,12 +31,14 @@ from focgen.identification.single import fit_each, is_step
 from focgen.identification.stages import StageFit, identify_stage
 from focgen.identification.sure import actuator_uncertainty, check_determined, is_compromise, with_stages
 from focgen.identification.zero import shared_zero
+from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import listed
 from focgen.logs.rates import at_one_rate
 from focgen.logs.read import Logs, digest_of, each_of, read_logs
 from focgen.output import check_apart, write_file
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
+from focgen.rig.engine import between_of
 from focgen.rig.files import check_replaces_rig, rig_text
 from focgen.rig.plausibility import doubts
 from focgen.rig.response import check_bounded, longest
@@ -93,7 +97,7 @@ def identify(
     others = _read(shown, nominal, None, None) if shown else ()
     _check_unseen(experiments, others)
     check_bounded(replace(nominal, actuator=None), longest(experiments))
-    found = {stage: identify_stage(experiments, stage) for stage in stages if stage != "actuator"}
+    found = {s: identify_stage(experiments, s, nominal.between) for s in stages if s != "actuator"}
     ranges, told = seen_ranges(nominal.ranges, experiments)
     new = _with_stages(replace(nominal, ranges=ranges, effects=()), found)
     if "actuator" in stages:
@@ -134,7 +138,14 @@ def _with_stages(rig: Rig, found: dict[str, StageFit]) -> Rig:
     """The rig with its regulator and sensor as identified."""
     delays = replace(rig.delays, **{name: fit.delay for name, fit in found.items()})
     transfers: dict[str, Any] = {name: fit.transfer for name, fit in found.items()}
-    return replace(rig, delays=delays, uncertainty=with_stages(rig.uncertainty, found), **transfers)
+    rig = replace(rig, delays=delays, uncertainty=with_stages(rig.uncertainty, found), **transfers)
+    return _running(rig, found["regulator"].between) if "regulator" in found else rig
+
+
+def _running(rig: Rig, between: Between | None) -> Rig:
+    """The rig with what its command does between samples, where that is known and not what a rig that says
+    nothing is simulated with."""
+    return rig if between in (None, between_of(rig, "command")) else replace(rig, between=between)
 
 
 def _actuator(
@@ -150,10 +161,7 @@ def _actuator(
         rig = replace(rig, delays=replace(rig.delays, actuator=0.0))
     check_alike(experiments, rig)
     driven = [e for e in experiments if is_driven(e)]
-    excitations = _prepared(driven or experiments, rig, degree + 1)
-    degree, lowered = feasible_degree(excitations, degree)
-    excitations = [x.with_powers(degree + 1) for x in excitations]
-    fit = fit_fractional(excitations, delay)
+    rig, (excitations, degree, lowered, fit) = _as_it_runs(driven or experiments, rig, degree, delay)
     check_determined(excitations, fit)
     excitations = [x.bare() for x in excitations]  # a long log's spectra are large
     fits, failed = fit_each(excitations, fit.pasts, fit.delay, integer)
@@ -174,6 +182,29 @@ def _actuator(
     if compromise:
         told += (_COMPROMISE,)
     return Identification(tuple(fits), joint, new, quality, criterion, warnings, told, shown)
+
+
+_Made = tuple[list[Excitation], int, tuple[str, ...], FractionalFit]
+
+
+def _as_it_runs(experiments: Sequence[Experiment], rig: Rig, degree: int, delay: bool) -> tuple[Rig, _Made]:
+    """The rig with what its command does between samples, where that drives the fit, and the fit: experiments
+    made ready, the degree of K(p), what there is to say of it, and T, α and K(p)."""
+
+    def made(way: Between) -> _Made:
+        ready = _prepared(experiments, replace(rig, between=way), degree + 1)
+        possible, lowered = feasible_degree(ready, degree)
+        ready = [x.with_powers(possible + 1) for x in ready]
+        return ready, possible, lowered, fit_fractional(ready, delay)
+
+    def left(of: _Made) -> Array:
+        ready, *_, fit = of
+        return np.concatenate([(x.measured - y) / x.spread for x, y in zip(ready, fit.simulated)])
+
+    if any("pressure" in e for e in experiments):
+        return rig, made(Between.STRAIGHT)
+    way = likeliest_way(ways_of(rig.between, [e["command"] for e in experiments]), made, left)
+    return _running(rig, way.between if way.sure else None), way.fit
 
 
 def _told(experiments: Sequence[Experiment], excitations: list[Excitation]) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ def remarks_of(experiments: Sequence[Experiment], nominal: Rig, found: Identific
     said = [*notes_of(experiments)]
     for fit in found.stages.values():
         said += fit.notes
+    said += _between(nominal, found.rig)
     said += _pasts(found)
     said += _singles(found)
     if isinstance(nominal.actuator, LinearActuator) and found.joint:
@@ -30,6 +31,15 @@ def remarks_of(experiments: Sequence[Experiment], nominal: Rig, found: Identific
     if found.joint and found.joint.closed_loop:
         said.append("closed loop: fitted with a model of the noise, so that feedback brings no bias")
     return tuple(said)
+
+
+def _between(nominal: Rig, found: Rig) -> list[str]:
+    """What the command does between its samples, where the logs have shown it."""
+    if found.between in (None, nominal.between):
+        return []
+    word = found.between.name.lower()
+    does = {"held": "is held", "straight": "runs in straight lines", "smooth": "is smooth"}[word]
+    return [f"the command {does} between its samples, as the logs show: written as between = {word!r}"]
 
 
 def _input(role: str, rig: Rig) -> str:

@@ -1,9 +1,9 @@
 """Regulator and sensor identified from their own signals, as rational stages with a dead time.
 
-The regulator runs from ``command``, held between samples, to ``pressure``; the sensor from ``curvature``,
-straight between samples, to ``output``. One stage is fitted to all experiments, each with an offset of its
-own, and with an initial state where it does not begin at rest. Of the shapes tried the simplest that explains
-the data is taken.
+The regulator runs from ``command``, held between samples unless the rig or the data say otherwise, to
+``pressure``; the sensor from ``curvature``, straight between samples, to ``output``. One stage is fitted to
+all experiments, each with an offset of its own, and with an initial state where it does not begin at rest. Of
+the shapes tried the simplest that explains the data is taken.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 from focgen.arrays import Array
 from focgen.errors import FitError, check_choice
 from focgen.fractional.transfer import TransferFunction
+from focgen.identification.between_samples import likeliest_way, ways_of
 from focgen.identification.digits import told_value
 from focgen.identification.directions import UpDown, fit_directions
 from focgen.identification.rational import LATEST, Record, parts
@@ -29,9 +30,10 @@ from focgen.identification.shapes import (
     refit,
 )
 from focgen.identification.stage_notes import notes_of
+from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
 
-_SIGNALS = {"regulator": ("command", "pressure", "zero"), "sensor": ("curvature", "output", "linear")}
+_SIGNALS = {"regulator": ("command", "pressure"), "sensor": ("curvature", "output")}
 _FEWEST = 30  # samples
 _MOST = 50_000  # samples that the shapes are compared on
 _SHOWS = 8  # samples that show whether a log begins at rest
@@ -45,9 +47,10 @@ class StageFit:
     ``stage`` is "regulator" or "sensor", ``transfer`` and ``delay`` (s) what the rig takes. ``shape`` is one
     of "gain", "1p", "2p", "2p1z", each with "+delay" where there is one. ``parameters`` maps gain, T or T1
     and T2 or wn and damping, zero and delay to (value, half 95 % interval), times in s, wn in rad/s.
-    ``gain_relative`` and ``time_relative`` are half 95 % intervals relative to the values. ``fits``: every
-    shape that was tried. ``up_down``: time constants of the two directions, None where they are not both
-    seen. ``measured`` and ``simulated`` (n,) of each of the experiments called ``names``, every ``step`` s.
+    ``gain_relative`` and ``time_relative`` are half 95 % intervals relative to the values. ``between``: what
+    its input does between samples, None where that is not to be told. ``fits``: every shape
+    that was tried. ``up_down``: time constants of the two directions, None where they are not both seen.
+    ``measured`` and ``simulated`` (n,) of each of the experiments called ``names``, every ``step`` s.
     """
 
     stage: str
@@ -57,6 +60,7 @@ class StageFit:
     parameters: dict[str, tuple[float, float]]
     gain_relative: float
     time_relative: float
+    between: Between | None
     gof: float
     fits: tuple[ShapeFit, ...]
     up_down: UpDown | None
@@ -73,17 +77,22 @@ class StageFit:
         return [(np.arange(len(y)) * self.step, y, made) for y, made in pairs]
 
 
-def identify_stage(experiments: Sequence[Experiment], stage: str) -> StageFit:
+def identify_stage(experiments: Sequence[Experiment], stage: str, between: Between | None = None) -> StageFit:
     """Fit a regulator (command → pressure) or a sensor (curvature → output) to all experiments that log both.
 
-    Raises FitError where the logs do not determine it.
+    ``between``: what the command does between its samples, None where the data are to show it. Raises
+    FitError where the logs do not determine the stage.
     """
     check_choice("--stages", stage, _SIGNALS, FitError)
     used = _usable(experiments, stage)
     step = used[0].sample_time
-    records = [_record(e, stage) for e in used]
-    _check(records, stage)
-    fits = fit_shapes(parts(records, _MOST), step)
+    _check([_record(e, stage, Between.HELD) for e in used], stage)
+    way = likeliest_way(
+        _ways(used, stage, between),
+        lambda way: fit_shapes(parts([_record(e, stage, way) for e in used], _MOST), step),
+        lambda fits: min((f.solved.left for f in fits), key=lambda left: float(left @ left)),
+    )
+    records, fits = [_record(e, stage, way.between) for e in used], way.fit
     short = choose(fits)
     up_down, short = fit_directions(fits, short, step)
     chosen = refit(short, records, step) if sum(map(len, records)) > _MOST else short
@@ -96,6 +105,7 @@ def identify_stage(experiments: Sequence[Experiment], stage: str) -> StageFit:
         parameters=chosen.report.parameters,
         gain_relative=chosen.half["gain"],
         time_relative=_time_relative(chosen),
+        between=way.between if way.sure else None,
         gof=chosen.report.gof,
         fits=tuple(f.report for f in fits),
         up_down=up_down,
@@ -126,7 +136,7 @@ def transfer_of(parameters: dict[str, tuple[float, float]]) -> TransferFunction:
 
 
 def _usable(experiments: Sequence[Experiment], stage: str) -> list[Experiment]:
-    source, target, _ = _SIGNALS[stage]
+    source, target = _SIGNALS[stage]
     both = [e for e in experiments if source in e and target in e]
     if not both:
         remedy = f"log them, and name their columns in [signals], or leave {stage} out of --stages"
@@ -142,10 +152,19 @@ def _usable(experiments: Sequence[Experiment], stage: str) -> list[Experiment]:
     return long
 
 
-def _record(experiment: Experiment, stage: str) -> Record:
-    source, target, hold = _SIGNALS[stage]
-    drive, measured = (np.asarray(experiment[role], float) for role in (source, target))
-    rests = hold == "zero" and np.ptp(drive) == 0.0 and bool(drive[0]) and _answers(measured)
+def _ways(experiments: Sequence[Experiment], stage: str, given: Between | None) -> tuple[Between, ...]:
+    """What the stage's input may do between its samples: a curvature runs straight, a command as
+    :func:`ways_of` has it. Here a smooth one counts as straight."""
+    if stage == "sensor":
+        return (Between.STRAIGHT,)
+    ways = ways_of(given, [e["command"] for e in experiments])
+    return tuple(way for way in ways if way != Between.SMOOTH) or (Between.STRAIGHT,)
+
+
+def _record(experiment: Experiment, stage: str, between: Between) -> Record:
+    hold = "zero" if between == Between.HELD else "linear"
+    drive, measured = (np.asarray(experiment[role], float) for role in _SIGNALS[stage])
+    rests = stage == "regulator" and np.ptp(drive) == 0.0 and bool(drive[0]) and _answers(measured)
     moves = not (rests or _still(drive, measured))
     return Record(experiment.name, drive if rests else drive - drive[0], measured, hold, bool(rests), moves)
 
@@ -171,7 +190,7 @@ def _answers(measured: Array) -> bool:
 
 
 def _check(records: Sequence[Record], stage: str) -> None:
-    source, target, _ = _SIGNALS[stage]
+    source, target = _SIGNALS[stage]
     if not any(np.any(r.drive) for r in records):
         what = f"the {source} never changes, so neither gain nor dynamics can be seen"
         raise FitError(stage, what, f"log steps of the {source}, up and down, each held until it settles")
@@ -181,7 +200,7 @@ def _check(records: Sequence[Record], stage: str) -> None:
 
 def _check_known(chosen: Fitted, fits: Sequence[Fitted], stage: str) -> None:
     """Raise FitError where the gain's interval reaches 0, in the shape taken or in one that is far better."""
-    source, target, _ = _SIGNALS[stage]
+    source, target = _SIGNALS[stage]
     better = [f for f in fits if f.gain_unknown and not f.report.refused and clearly_better(f, chosen)]
     if not chosen.gain_unknown and not better:
         return

@@ -96,16 +96,16 @@ def jumps_of(values: Array) -> Bools:
     return np.concatenate([[False], large & alone])
 
 
-def course_of(powers: Array, jumps: Bools, held: bool = False) -> Course:
+def course_of(powers: Array, jumps: Bools, between: Between = Between.SMOOTH) -> Course:
     """The course of inputs ``powers`` (m, n), 0 before their first sample, with ``jumps`` (n,) by
-    :func:`jumps_of`; ``held``: it changes in jumps only.
+    :func:`jumps_of`; ``between``: what they do where they do not jump.
     """
     changes = np.diff(powers, axis=1, prepend=0.0)
-    at_once = np.ones(len(jumps), bool) if held else jumps.copy()
+    at_once = jumps | (between == Between.HELD)
     at_once[0] = True
     jumped = np.where(at_once, changes, 0.0)
     course = Course(powers, jumped, changes - jumped)
-    if held or np.all(at_once):
+    if between != Between.SMOOTH or np.all(at_once):
         return course
     bends, twists = zip(*(_bent(row, at_once) for row in powers))
     if not np.any(bends):
