@@ -21,6 +21,22 @@ _SURELY = 20.0  # to one: another way than held has to be likelier by that
 
 
 @dataclass(frozen=True)
+class Tried(Generic[T]):
+    """A ``fit`` of so many ``numbers`` to a command that runs so ``between`` its samples, and what it leaves
+    (n,)."""
+
+    between: Between
+    fit: T
+    left: Array
+    numbers: int = 0
+
+    @property
+    def square(self) -> float:
+        """The mean square that it leaves."""
+        return max(float(np.mean(self.left**2)), 1e-300)
+
+
+@dataclass(frozen=True)
 class Way(Generic[T]):
     """What a command does ``between`` its samples, the ``fit`` with it, and whether that is ``sure``: known,
     or far likelier than anything else."""
@@ -30,21 +46,16 @@ class Way(Generic[T]):
     sure: bool
 
 
-def likeliest_way(
-    ways: Sequence[Between], made: Callable[[Between], T], left: Callable[[T], Array]
-) -> Way[T]:
-    """The likeliest of the ``ways`` that a command may run between its samples, with the fit ``made`` of it.
+def likeliest_way(ways: Sequence[Between], tried: Callable[[Between], Tried[T]]) -> Way[T]:
+    """The likeliest of the ``ways`` that a command may run between its samples, by a fit ``tried`` with each.
 
-    ``left``: the residual of a fit (n,), as many numbers fitted whatever the way. The first of the ways is
-    the usual one: another has to leave far less than it would by chance.
+    The first of the ways is the usual one: another has to leave far less than it would by chance.
     """
-    usual, *others = [(way, made(way)) for way in ways]
-    if not others:
-        return Way(*usual, sure=True)
-    closest = min(others, key=lambda pair: _square(left(pair[1])))
-    if _far_less(left(closest[1]), left(usual[1])):
-        return Way(*closest, sure=True)
-    return Way(*usual, sure=_far_less(left(usual[1]), left(closest[1])))
+    usual, *others = map(tried, ways)
+    closest = min(others, key=lambda other: other.square, default=None)
+    if closest is not None and _far_likelier(closest, usual):
+        return Way(closest.between, closest.fit, sure=True)
+    return Way(usual.between, usual.fit, sure=closest is None or _far_likelier(usual, closest))
 
 
 def ways_of(given: Between | None, commands: Sequence[Array]) -> tuple[Between, ...]:
@@ -59,11 +70,8 @@ def ways_of(given: Between | None, commands: Sequence[Array]) -> tuple[Between, 
     return (Between.HELD, Between.STRAIGHT) if rests else (Between.HELD, Between.STRAIGHT, Between.SMOOTH)
 
 
-def _far_less(one: Array, other: Array) -> bool:
-    """Whether a residual is smaller than another one by more than chance makes it."""
-    fell = np.log(max(_square(other), 1e-300) / max(_square(one), 1e-300))
-    return bool(0.5 * effective_samples(one) * fell > np.log(_SURELY))
-
-
-def _square(residual: Array) -> float:
-    return float(np.mean(residual**2))
+def _far_likelier(one: Tried[T], other: Tried[T]) -> bool:
+    """Whether chance does not make a fit so much better than another one, by Schwarz's criterion."""
+    independent = effective_samples(one.left)
+    gain = 0.5 * independent * np.log(other.square / one.square)
+    return bool(gain - 0.5 * (one.numbers - other.numbers) * np.log(independent) > np.log(_SURELY))

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 
 from focgen.arguments import checked
-from focgen.arrays import Array
 from focgen.custody import identified_from
 from focgen.errors import FitError, LogError, check_choice
-from focgen.identification.between_samples import likeliest_way, ways_of
+from focgen.identification.between_samples import Tried, likeliest_way, ways_of
 from focgen.identification.caveats import effects_left_out, warnings_of
 from focgen.identification.digits import told_gain, told_value
 from focgen.identification.excitation import Excitation, is_driven, possible_rests, prepare
@@ -191,19 +190,17 @@ def _as_it_runs(experiments: Sequence[Experiment], rig: Rig, degree: int, delay:
     """The rig with what its command does between samples, where that drives the fit, and the fit: experiments
     made ready, the degree of K(p), what there is to say of it, and T, α and K(p)."""
 
-    def made(way: Between) -> _Made:
+    def tried(way: Between) -> Tried[_Made]:
         ready = _prepared(experiments, replace(rig, between=way), degree + 1)
         possible, lowered = feasible_degree(ready, degree)
         ready = [x.with_powers(possible + 1) for x in ready]
-        return ready, possible, lowered, fit_fractional(ready, delay)
-
-    def left(of: _Made) -> Array:
-        ready, *_, fit = of
-        return np.concatenate([(x.measured - y) / x.spread for x, y in zip(ready, fit.simulated)])
+        fit = fit_fractional(ready, delay)
+        left = np.concatenate([(x.measured - y) / x.spread for x, y in zip(ready, fit.simulated)])
+        return Tried(way, (ready, possible, lowered, fit), left)
 
     if any("pressure" in e for e in experiments):
-        return rig, made(Between.STRAIGHT)
-    way = likeliest_way(ways_of(rig.between, [e["command"] for e in experiments]), made, left)
+        return rig, tried(Between.STRAIGHT).fit
+    way = likeliest_way(ways_of(rig.between, [e["command"] for e in experiments]), tried)
     return _running(rig, way.between if way.sure else None), way.fit
 
 

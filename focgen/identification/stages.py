@@ -16,7 +16,7 @@ import numpy as np
 from focgen.arrays import Array
 from focgen.errors import FitError, check_choice
 from focgen.fractional.transfer import TransferFunction
-from focgen.identification.between_samples import likeliest_way, ways_of
+from focgen.identification.between_samples import Tried, likeliest_way, ways_of
 from focgen.identification.digits import told_value
 from focgen.identification.directions import UpDown, fit_directions
 from focgen.identification.rational import LATEST, Record, parts
@@ -88,9 +88,7 @@ def identify_stage(experiments: Sequence[Experiment], stage: str, between: Betwe
     step = used[0].sample_time
     _check([_record(e, stage, Between.HELD) for e in used], stage)
     way = likeliest_way(
-        _ways(used, stage, between),
-        lambda way: fit_shapes(parts([_record(e, stage, way) for e in used], _MOST), step),
-        lambda fits: min((f.solved.left for f in fits), key=lambda left: float(left @ left)),
+        _ways(used, stage, between), lambda way: _tried([_record(e, stage, way) for e in used], step, way)
     )
     records, fits = [_record(e, stage, way.between) for e in used], way.fit
     short = choose(fits)
@@ -150,6 +148,13 @@ def _usable(experiments: Sequence[Experiment], stage: str) -> list[Experiment]:
         what = f"the logs are sampled every {min(steps):g} and every {max(steps):g} s"
         raise FitError(stage, what, "identify them one sample time at a time")
     return long
+
+
+def _tried(records: Sequence[Record], step: float, way: Between) -> Tried[list[Fitted]]:
+    """Every shape, fitted to a drive that runs so, and what the one to be taken leaves."""
+    fits = fit_shapes(parts(records, _MOST), step)
+    short = choose(fits)
+    return Tried(way, fits, short.solved.left, short.shape.parameters)
 
 
 def _ways(experiments: Sequence[Experiment], stage: str, given: Between | None) -> tuple[Between, ...]:

@@ -83,17 +83,18 @@ def two_others(
 
 
 def _pairs(found: Fit, first: Ranking, candidates: Sequence[CandidateEffect]) -> Iterator[Fit]:
-    """The likeliest pairs with the one ``found``, and of the likeliest others, as fits to all samples that
-    have yet to be made: they are looked for on means of few. What changes the plant's own equation is left
-    out, for beside that every run takes several times as long."""
+    """The likeliest pairs with the one ``found``, beside others in another form, too, and of the likeliest
+    others, as fits to all samples that have yet to be made: they are looked for on means of few. What changes
+    the plant's own equation is left out, for beside that every run takes several times as long."""
     name, seconds = family(found), [c for c in candidates if not _in_the_plant(c)]
     firsts = [f for f in first.firsts(without=_in_the_plant) if family(f) != name]
     for one in [found, *firsts[:_TRIED]]:
         factor = max(1, min(len(one.problem.segment.y) // _SEEN, one.problem.coarsest))
         thin = one.problem.thinned(factor)
-        beside = [c for c in thin.untried(seconds) if c.effect not in (name, family(one))]
-        second = rank(thin, thin.stretched(one.vector, 1.0 / factor), beside)
-        for both in list(second.best.values())[:_SECONDS]:
+        beside = [c for c in thin.untried(seconds) if c.effect != family(one)]
+        best = rank(thin, thin.stretched(one.vector, 1.0 / factor), beside).best
+        others = [both for other, both in best.items() if other != name][:_SECONDS]
+        for both in [*others, best[name]] if name in best else others:
             yield on_all(both, one.problem, factor)
 
 
