@@ -38,24 +38,32 @@ class Tried(Generic[T]):
 
 @dataclass(frozen=True)
 class Way(Generic[T]):
-    """What a command does ``between`` its samples, the ``fit`` with it, and whether that is ``sure``: known,
-    or far likelier than anything else."""
+    """What a command does ``between`` its samples, and the ``fit`` with it. ``rival``: the fit with what it
+    may do as well, None where nothing else is likely."""
 
     between: Between
     fit: T
-    sure: bool
+    rival: T | None = None
+
+    @property
+    def known(self) -> Between | None:
+        """What it does, None where that does not show."""
+        return self.between if self.rival is None else None
 
 
-def likeliest_way(ways: Sequence[Between], tried: Callable[[Between], Tried[T]]) -> Way[T]:
+def likeliest_way(ways: Sequence[Between], tried: Callable[[Between], Tried[T]], rests: bool) -> Way[T]:
     """The likeliest of the ``ways`` that a command may run between its samples, by a fit ``tried`` with each.
 
-    The first of the ways is the usual one: another has to leave far less than it would by chance.
+    The first of the ways is the usual one: another has to leave far less than it would by chance. Where a
+    command ``rests`` between jumps, the usual one is as good as known.
     """
     usual, *others = map(tried, ways)
     closest = min(others, key=lambda other: other.square, default=None)
-    if closest is not None and _far_likelier(closest, usual):
-        return Way(closest.between, closest.fit, sure=True)
-    return Way(usual.between, usual.fit, sure=closest is None or _far_likelier(usual, closest))
+    if closest is None:
+        return Way(usual.between, usual.fit)
+    if is_far_likelier(closest, usual):
+        return Way(closest.between, closest.fit)
+    return Way(usual.between, usual.fit, None if rests or is_far_likelier(usual, closest) else closest.fit)
 
 
 def ways_of(given: Between | None, commands: Sequence[Array]) -> tuple[Between, ...]:
@@ -63,14 +71,17 @@ def ways_of(given: Between | None, commands: Sequence[Array]) -> tuple[Between, 
     or held, in straight lines, and smooth where they do not rest."""
     if given is not None:
         return (given,)
-    changes = np.concatenate([np.diff(x) for x in commands])
-    if not np.any(changes):
+    if not any(map(np.ptp, commands)):
         return (Between.HELD,)
-    rests = np.mean(changes == 0.0) > _RESTS
-    return (Between.HELD, Between.STRAIGHT) if rests else (Between.HELD, Between.STRAIGHT, Between.SMOOTH)
+    return (Between.HELD, Between.STRAIGHT, Between.SMOOTH)[: 2 if at_rest(commands) else 3]
 
 
-def _far_likelier(one: Tried[T], other: Tried[T]) -> bool:
+def at_rest(commands: Sequence[Array]) -> bool:
+    """Whether commands (n,) rest but for jumps."""
+    return bool(np.mean(np.concatenate([np.diff(x) == 0.0 for x in commands])) > _RESTS)
+
+
+def is_far_likelier(one: Tried[T], other: Tried[T]) -> bool:
     """Whether chance does not make a fit so much better than another one, by Schwarz's criterion."""
     independent = effective_samples(one.left)
     gain = 0.5 * independent * np.log(other.square / one.square)

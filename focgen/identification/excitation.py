@@ -15,6 +15,7 @@ from focgen.errors import FitError, LogError
 from focgen.fractional.simulation import Convolution
 from focgen.fractional.transfer import TransferFunction
 from focgen.identification.kernel import Kernels
+from focgen.identification.smoothed import without_noise
 from focgen.logs.between import Between, Course, course_of, jumps_of, noise_level
 from focgen.logs.experiment import Experiment
 from focgen.logs.feedback import unlogged_reference
@@ -38,10 +39,11 @@ _FOLLOWED = 8  # first samples of a moving input that a line is drawn through wh
 class Excitation:
     """One experiment made ready: the input's powers as the dynamics see them, and the fitted signal.
 
-    ``pressure`` (n,) is the input of the actuator, measured or through the regulator; ``before`` its constant
-    value ahead of the first sample; ``level`` the value it is stepped to. ``course`` holds pressure^m −
-    before^m, m = 1, 2, …, through the sensor where its output is fitted; ``sensor`` is 1 where the curvature
-    is. ``rest_shown``: whether the log begins before the first step, so that it shows the output's zero.
+    ``pressure`` (n,) is the input of the actuator, measured, but for its noise, or through the regulator;
+    ``before`` its constant value ahead of the first sample; ``level`` the value it is stepped to. ``course``
+    holds pressure^m − before^m, m = 1, 2, …, through the sensor where its output is fitted; ``sensor`` is 1
+    where the curvature is. ``rest_shown``: whether the log begins before the first step, so that it shows the
+    output's zero.
     ``reference`` (n,) where a loop was closed, logged or not. ``late``: the nominal dead time of the stages
     that it is seen through, s. ``begins_up``: whether the input was held away from 0 ahead of the first
     sample.
@@ -262,11 +264,11 @@ def _input(
 ) -> tuple[Array, float, Bools, Between, str]:
     """The actuator's input: (samples, value before them, where it jumps, what it does between, its role)."""
     if "pressure" in experiment:
-        values = experiment["pressure"]
-        rest = _rest_of(values) if before is None else before
+        values, jumps = _measured(experiment, rig)
+        rest = _rest_of(experiment["pressure"]) if before is None else before
         if before is None:
             values = np.concatenate([[rest], values[1:]])  # the first sample's noise is no step
-        return values, rest, jumps_of(values), Between.SMOOTH, "pressure"
+        return values, rest, jumps, Between.SMOOTH, "pressure"
     command, between = experiment["command"], Between.HELD if rig.between is None else rig.between
     rest = float(command[0]) if before is None else before
     none = np.zeros(len(command), bool)
@@ -275,9 +277,35 @@ def _input(
     gain = rig.regulator.dc_gain
     if not np.isfinite(gain):
         raise FitError("regulator", "integrates, so it has no rest to start from", "log the pressure")
-    hold: Literal["zero", "linear"] = "zero" if between == Between.HELD else "linear"
-    moved = _run("regulator", rig.regulator, experiment.sample_time, hold, command - rest)
+    moved = _run("regulator", rig.regulator, experiment.sample_time, _hold(rig), command - rest)
     return gain * rest + moved, gain * rest, none, Between.SMOOTH, "command"
+
+
+def _measured(experiment: Experiment, rig: Rig) -> tuple[Array, Bools]:
+    """The measured pressure without its noise, and where it jumps. What a controller makes of noise moves the
+    rig: in a closed loop it is as it was measured."""
+    values = experiment["pressure"]
+    jumps = jumps_of(values)
+    if _varying_reference(experiment) is not None:
+        return values, jumps
+    known = _by_regulator(experiment, rig)
+    smooth = without_noise(values, jumps, known)
+    return smooth, jumps if known is None or smooth is values else jumps_of(smooth)
+
+
+def _by_regulator(experiment: Experiment, rig: Rig) -> Array | None:
+    """What the regulator makes of the command (n,), from rest; None where either is not known."""
+    if "command" not in experiment or rig.regulator == UNITY or not np.isfinite(rig.regulator.dc_gain):
+        return None
+    command, places = experiment["command"], np.arange(len(experiment["command"]))
+    moved = _run("regulator", rig.regulator, experiment.sample_time, _hold(rig), command - command[0])
+    made: Array = np.interp(places - rig.delays.regulator / experiment.sample_time, places, moved)
+    return made
+
+
+def _hold(rig: Rig) -> Literal["zero", "linear"]:
+    """What a command does between its samples, in front of a regulator."""
+    return "zero" if rig.between in (None, Between.HELD) else "linear"
 
 
 def _run(

@@ -12,7 +12,7 @@ import numpy as np
 from focgen.arguments import checked
 from focgen.custody import identified_from
 from focgen.errors import FitError, LogError, check_choice
-from focgen.identification.between_samples import Tried, likeliest_way, ways_of
+from focgen.identification.between_samples import Tried, at_rest, likeliest_way, ways_of
 from focgen.identification.caveats import effects_left_out, warnings_of
 from focgen.identification.digits import told_gain, told_value
 from focgen.identification.excitation import Excitation, is_driven, possible_rests, prepare
@@ -200,8 +200,9 @@ def _as_it_runs(experiments: Sequence[Experiment], rig: Rig, degree: int, delay:
 
     if any("pressure" in e for e in experiments):
         return rig, tried(Between.STRAIGHT).fit
-    way = likeliest_way(ways_of(rig.between, [e["command"] for e in experiments]), tried)
-    return _running(rig, way.between if way.sure else None), way.fit
+    commands = [e["command"] for e in experiments]
+    way = likeliest_way(ways_of(rig.between, commands), tried, at_rest(commands))
+    return _running(rig, way.known), way.fit
 
 
 def _told(experiments: Sequence[Experiment], excitations: list[Excitation]) -> tuple[str, ...]:

@@ -172,7 +172,7 @@ def _eliminated(sums: Array, cut: int) -> Array:
 
 def _weights(products: Array, wanted: Array) -> Array:
     """Solve the normal equations, scaled to unit rows; rows that are one share its weight."""
-    sizes = np.sqrt(np.diag(products))
+    sizes = np.sqrt(np.maximum(np.diag(products), 0.0))  # rounding below 0
     sizes = np.where(sizes > 0.0, sizes, 1.0)
     values, vectors = np.linalg.eigh(products / np.outer(sizes, sizes))
     kept = values > _RANK * max(values[-1], 1e-300)

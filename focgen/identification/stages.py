@@ -9,14 +9,14 @@ the shapes tried the simplest that explains the data is taken.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from focgen.arrays import Array
 from focgen.errors import FitError, check_choice
 from focgen.fractional.transfer import TransferFunction
-from focgen.identification.between_samples import Tried, likeliest_way, ways_of
+from focgen.identification.between_samples import Tried, at_rest, is_far_likelier, likeliest_way, ways_of
 from focgen.identification.digits import told_value
 from focgen.identification.directions import UpDown, fit_directions
 from focgen.identification.rational import LATEST, Record, parts
@@ -29,8 +29,9 @@ from focgen.identification.shapes import (
     fit_shapes,
     refit,
 )
+from focgen.identification.smoothed import without_noise
 from focgen.identification.stage_notes import notes_of
-from focgen.logs.between import Between
+from focgen.logs.between import Between, jumps_of
 from focgen.logs.experiment import Experiment
 
 _SIGNALS = {"regulator": ("command", "pressure"), "sensor": ("curvature", "output")}
@@ -88,13 +89,16 @@ def identify_stage(experiments: Sequence[Experiment], stage: str, between: Betwe
     step = used[0].sample_time
     _check([_record(e, stage, Between.HELD) for e in used], stage)
     way = likeliest_way(
-        _ways(used, stage, between), lambda way: _tried([_record(e, stage, way) for e in used], step, way)
+        _ways(used, stage, between),
+        lambda way: _tried([_record(e, stage, way) for e in used], step, way),
+        at_rest([e[_SIGNALS[stage][0]] for e in used]),
     )
     records, fits = [_record(e, stage, way.between) for e in used], way.fit
     short = choose(fits)
     up_down, short = fit_directions(fits, short, step)
     chosen = refit(short, records, step) if sum(map(len, records)) > _MOST else short
     _check_known(chosen, fits, stage)
+    chosen = _as_unsure(chosen, way.rival or ())
     return StageFit(
         stage=stage,
         transfer=transfer_of(chosen.report.parameters),
@@ -103,7 +107,7 @@ def identify_stage(experiments: Sequence[Experiment], stage: str, between: Betwe
         parameters=chosen.report.parameters,
         gain_relative=chosen.half["gain"],
         time_relative=_time_relative(chosen),
-        between=way.between if way.sure else None,
+        between=way.known,
         gof=chosen.report.gof,
         fits=tuple(f.report for f in fits),
         up_down=up_down,
@@ -157,6 +161,20 @@ def _tried(records: Sequence[Record], step: float, way: Between) -> Tried[list[F
     return Tried(way, fits, short.solved.left, short.shape.parameters)
 
 
+def _as_unsure(chosen: Fitted, others: Sequence[Fitted]) -> Fitted:
+    """A fit with its intervals as wide as the same shape is away among the ``others``, of a command that may
+    run otherwise between its samples: a lag is known to half a sample where that does not show."""
+    other = next((f for f in others if f.shape == chosen.shape), None)
+    if other is None or is_far_likelier(*(Tried(Between.HELD, f, f.solved.left) for f in (chosen, other))):
+        return chosen
+    there = other.report.parameters
+    wide = {
+        name: (value, max(half, abs(value - there[name][0])) if name in there else half)
+        for name, (value, half) in chosen.report.parameters.items()
+    }
+    return replace(chosen, report=replace(chosen.report, parameters=wide))
+
+
 def _ways(experiments: Sequence[Experiment], stage: str, given: Between | None) -> tuple[Between, ...]:
     """What the stage's input may do between its samples: a curvature runs straight, a command as
     :func:`ways_of` has it. Here a smooth one counts as straight."""
@@ -169,6 +187,8 @@ def _ways(experiments: Sequence[Experiment], stage: str, given: Between | None) 
 def _record(experiment: Experiment, stage: str, between: Between) -> Record:
     hold = "zero" if between == Between.HELD else "linear"
     drive, measured = (np.asarray(experiment[role], float) for role in _SIGNALS[stage])
+    if stage == "sensor":
+        drive = without_noise(drive, jumps_of(drive))
     rests = stage == "regulator" and np.ptp(drive) == 0.0 and bool(drive[0]) and _answers(measured)
     moves = not (rests or _still(drive, measured))
     return Record(experiment.name, drive if rests else drive - drive[0], measured, hold, bool(rests), moves)

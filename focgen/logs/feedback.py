@@ -119,7 +119,8 @@ def _foretold(values: Array, other: Array, seen: Bools) -> tuple[float, Array]:
         left: Array = target - rows @ shares
         kept = seen & (np.abs(left) <= _FAR * _typical(left[seen]))
     along = np.r_[np.zeros(_PAST + 1), np.ones(_PAST)]
-    error = np.std(left[kept]) * np.sqrt(along @ np.linalg.pinv(rows[kept].T @ rows[kept]) @ along)
+    spread = max(along @ np.linalg.pinv(rows[kept].T @ rows[kept]) @ along, 0.0)  # rounding below 0
+    error = np.std(left[kept]) * np.sqrt(spread)
     return float(along @ shares) / max(float(error), 1e-300), left
 
 
