@@ -11,13 +11,17 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from focgen.arrays import Array
+from focgen.errors import FitError
 from focgen.identification.quality import effective_samples
 from focgen.logs.between import Between
 
 T = TypeVar("T")
 
 _RESTS = 0.5  # of a command's samples at which it rests: then it is no smooth curve
-_SURELY = 20.0  # to one: another way than held has to be likelier by that
+_SURELY = 20.0  # to one: another way than held has to be likelier by that,
+_LESS = (
+    0.95  # and leave so much of the mean square at most: what a model lacks of a rig, chance does not make
+)
 
 
 @dataclass(frozen=True)
@@ -38,8 +42,8 @@ class Tried(Generic[T]):
 
 @dataclass(frozen=True)
 class Way(Generic[T]):
-    """What a command does ``between`` its samples, and the ``fit`` with it. ``rival``: the fit with what it
-    may do as well, None where nothing else is likely."""
+    """What a command does ``between`` its samples, and the ``fit`` with it. ``rival``: the fit with another
+    way that is nearly as likely, None where there is none."""
 
     between: Between
     fit: T
@@ -55,15 +59,23 @@ def likeliest_way(ways: Sequence[Between], tried: Callable[[Between], Tried[T]],
     """The likeliest of the ``ways`` that a command may run between its samples, by a fit ``tried`` with each.
 
     The first of the ways is the usual one: another has to leave far less than it would by chance. Where a
-    command ``rests`` between jumps, the usual one is as good as known.
+    command ``rests`` between jumps, the usual one is as good as known. Raises FitError where that cannot be
+    fitted.
     """
-    usual, *others = map(tried, ways)
+    usual, others = tried(ways[0]), [found for way in ways[1:] if (found := _if_fitted(tried, way))]
     closest = min(others, key=lambda other: other.square, default=None)
     if closest is None:
         return Way(usual.between, usual.fit)
     if is_far_likelier(closest, usual):
         return Way(closest.between, closest.fit)
     return Way(usual.between, usual.fit, None if rests or is_far_likelier(usual, closest) else closest.fit)
+
+
+def _if_fitted(tried: Callable[[Between], Tried[T]], way: Between) -> Tried[T] | None:
+    try:
+        return tried(way)
+    except FitError:
+        return None
 
 
 def ways_of(given: Between | None, commands: Sequence[Array]) -> tuple[Between, ...]:
@@ -82,7 +94,9 @@ def at_rest(commands: Sequence[Array]) -> bool:
 
 
 def is_far_likelier(one: Tried[T], other: Tried[T]) -> bool:
-    """Whether chance does not make a fit so much better than another one, by Schwarz's criterion."""
+    """Whether neither chance, by Schwarz's criterion, nor what a model lacks makes a fit so much better than
+    another one."""
     independent = effective_samples(one.left)
     gain = 0.5 * independent * np.log(other.square / one.square)
-    return bool(gain - 0.5 * (one.numbers - other.numbers) * np.log(independent) > np.log(_SURELY))
+    beyond_chance = gain - 0.5 * (one.numbers - other.numbers) * np.log(independent) > np.log(_SURELY)
+    return bool(beyond_chance and one.square < _LESS * other.square)

@@ -143,8 +143,9 @@ def _with_stages(rig: Rig, found: dict[str, StageFit]) -> Rig:
 
 def _running(rig: Rig, between: Between | None) -> Rig:
     """The rig with what its command does between samples, where that is known and not what a rig that says
-    nothing is simulated with."""
-    return rig if between in (None, between_of(rig, "command")) else replace(rig, between=between)
+    nothing is taken for everywhere: a regulator whose command is held."""
+    usual = rig.between is None and between == Between.HELD == between_of(rig, "command")
+    return rig if between is None or usual else replace(rig, between=between)
 
 
 def _actuator(
@@ -160,8 +161,11 @@ def _actuator(
         rig = replace(rig, delays=replace(rig.delays, actuator=0.0))
     check_alike(experiments, rig)
     driven = [e for e in experiments if is_driven(e)]
-    rig, (excitations, degree, lowered, fit) = _as_it_runs(driven or experiments, rig, degree, delay)
+    rig, apart = _as_it_runs(driven or experiments, rig, degree, delay)
+    excitations, lowered = _ready(driven or experiments, rig, degree)
+    fit = fit_fractional(excitations, delay)
     check_determined(excitations, fit)
+    fit = replace(fit, half=fit.half | {name: np.maximum(fit.half[name], by) for name, by in apart.items()})
     excitations = [x.bare() for x in excitations]  # a long log's spectra are large
     fits, failed = fit_each(excitations, fit.pasts, fit.delay, integer)
     joint, compromise = _joint(excitations, fit, fits), is_compromise(excitations, fit)
@@ -183,26 +187,37 @@ def _actuator(
     return Identification(tuple(fits), joint, new, quality, criterion, warnings, told, shown)
 
 
-_Made = tuple[list[Excitation], int, tuple[str, ...], FractionalFit]
+def _as_it_runs(
+    experiments: Sequence[Experiment], rig: Rig, degree: int, delay: bool
+) -> tuple[Rig, dict[str, Any]]:
+    """The rig with what its command does between samples, where that drives the fit, and by how much each of
+    the numbers found is another where it may do something else. Pasts are left to the fit itself: they take
+    longest."""
 
-
-def _as_it_runs(experiments: Sequence[Experiment], rig: Rig, degree: int, delay: bool) -> tuple[Rig, _Made]:
-    """The rig with what its command does between samples, where that drives the fit, and the fit: experiments
-    made ready, the degree of K(p), what there is to say of it, and T, α and K(p)."""
-
-    def tried(way: Between) -> Tried[_Made]:
-        ready = _prepared(experiments, replace(rig, between=way), degree + 1)
-        possible, lowered = feasible_degree(ready, degree)
-        ready = [x.with_powers(possible + 1) for x in ready]
-        fit = fit_fractional(ready, delay)
+    def tried(way: Between) -> Tried[FractionalFit]:
+        ready, _ = _ready(experiments, replace(rig, between=way), degree)
+        fit = fit_fractional(ready, delay, pasts=[None] * len(ready))
         left = np.concatenate([(x.measured - y) / x.spread for x, y in zip(ready, fit.simulated)])
-        return Tried(way, (ready, possible, lowered, fit), left)
+        return Tried(way, fit, left)
 
-    if any("pressure" in e for e in experiments):
-        return rig, tried(Between.STRAIGHT).fit
-    commands = [e["command"] for e in experiments]
-    way = likeliest_way(ways_of(rig.between, commands), tried, at_rest(commands))
-    return _running(rig, way.known), way.fit
+    commands = [e["command"] for e in experiments if "pressure" not in e]
+    ways = ways_of(rig.between, commands) if len(commands) == len(experiments) else ()
+    if len(ways) < 2:
+        return rig, {}
+    way = likeliest_way(ways, tried, at_rest(commands))
+    if way.rival is None:
+        return _running(rig, way.between), {}
+    names = ("T", "alpha", "delay", "gain")
+    return rig, {n: np.abs(getattr(way.fit, n) - getattr(way.rival, n)) for n in names}
+
+
+def _ready(
+    experiments: Sequence[Experiment], rig: Rig, degree: int
+) -> tuple[list[Excitation], tuple[str, ...]]:
+    """The experiments made ready for a K(p) of the ``degree``, or of one that they show, which it says."""
+    ready = _prepared(experiments, rig, degree + 1)
+    possible, lowered = feasible_degree(ready, degree)
+    return [x.with_powers(possible + 1) for x in ready], lowered
 
 
 def _told(experiments: Sequence[Experiment], excitations: list[Excitation]) -> tuple[str, ...]:

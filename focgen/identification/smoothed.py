@@ -16,8 +16,9 @@ from focgen.logs.between import noise_level, white_level
 
 _DIFFERENCE = np.array([-1.0, 3.0, -3.0, 1.0])  # the third
 _WEIGHTS = 10.0 ** np.arange(-2.0, 9.0, 0.5)  # of third differences, that are tried
-# times that weight: a curve that is closest to the truth is a little late and low where this turns, which
-_EASIER = 0.01  # is worse for a model than the noise that one of twice the bandwidth lets through
+# Of that weight: twice the bandwidth. The curve that is closest to the truth on average rounds its turns, and
+# that is worse for a model than the noise which this one lets through.
+_EASIER = 0.01
 _FEWEST = 30  # samples
 _SEEN = 1e-4  # of the spread: noise below is as good as none
 _MOST = 0.2  # of the standard deviation: what is quicker than a curve and as large may be the signal itself

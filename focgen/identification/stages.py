@@ -162,8 +162,9 @@ def _tried(records: Sequence[Record], step: float, way: Between) -> Tried[list[F
 
 
 def _as_unsure(chosen: Fitted, others: Sequence[Fitted]) -> Fitted:
-    """A fit with its intervals as wide as the same shape is away among the ``others``, of a command that may
-    run otherwise between its samples: a lag is known to half a sample where that does not show."""
+    """A fit whose intervals reach to the numbers of the same shape among the ``others``, which are those of a
+    command that runs in another way between its samples: where that does not show, a lag is known to half a
+    sample."""
     other = next((f for f in others if f.shape == chosen.shape), None)
     if other is None or is_far_likelier(*(Tried(Between.HELD, f, f.solved.left) for f in (chosen, other))):
         return chosen

@@ -89,12 +89,15 @@ def replay(rig: RigLike, logs: Logs, from_: float | None = None, to: float | Non
 
 def _replayed(given: Rig, session: Sequence[Experiment]) -> Replay:
     """The replay of a rig whose effects count as its signals are."""
-    told = told_between(given, session)
-    session = _lasting(told, _with_past(told, session))
+    told, logs = told_between(given, session), session
+    session = _lasting(told, _with_past(told, logs))
+    if given.between is not None and (again := told_between(told, session)) != told:
+        told, session = again, _lasting(again, _with_past(again, logs))
     simulated = simulate_session(told, session)
     results = {log.name: _compared(log, made) for log, made in zip(session, simulated)}
     made = {log.name: made for log, made in zip(session, simulated)}
-    return Replay(results, made, notes_of(session), doubts(told, session), told, tuple(session))
+    said = doubts(told, session) + otherwise_between(given, told)
+    return Replay(results, made, notes_of(session), said, told, tuple(session))
 
 
 def _with_past(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
@@ -171,13 +174,15 @@ def held_by_a_controller(rig: Rig, logs: Sequence[Experiment]) -> Rig:
 
 def told_between(rig: Rig, logs: Sequence[Experiment]) -> Rig:
     """The rig with what its first input does between its samples, where the rig does not say it and the logs
-    do: what :func:`between_of` says, unless the output comes much closer to another way. A pressure runs in
-    lines, and may be held where it only jumps and rests."""
+    do: what :func:`between_of` says, unless the output comes much closer to another way. What the rig says
+    itself is left where it comes much closer to another one: other loggers have other ways. A pressure runs
+    in lines, and may be held where it only jumps and rests."""
+    says = rig.between is not None
     rig, entry = held_by_a_controller(rig, logs), entry_of(logs)
-    if rig.between is not None or not all(entry in log and "output" in log for log in logs):
+    if (rig.between is not None and not says) or not all(entry in log and "output" in log for log in logs):
         return rig
-    usual, likely, closer = between_of(rig, entry), list(Between), _CLOSER
-    if entry == "pressure":
+    usual, likely, closer = between_of(rig, entry), list(Between), _HELD if says else _CLOSER
+    if entry == "pressure" and not says:
         likely, closer = [Between.STRAIGHT, Between.HELD][: 1 + jumps_and_rests(logs, entry)], _HELD
     if len(likely) == 1:
         return rig
@@ -185,6 +190,14 @@ def told_between(rig: Rig, logs: Sequence[Experiment]) -> Rig:
     left = [_left(way, logs) for way in ways]
     closest = int(np.argmin(left))
     return ways[closest] if left[closest] < closer * left[0] else rig
+
+
+def otherwise_between(given: Rig, told: Rig) -> tuple[str, ...]:
+    """A warning where the logs have shown another way between samples than the one that a rig says."""
+    if given.between in (None, told.between) or told.between is None:
+        return ()
+    says, does = (f"{rig.between.name.lower()!r}" for rig in (given, told) if rig.between is not None)
+    return (f"between in [signals] is {says}, but these logs show {does}, which is taken for them",)
 
 
 def _left(rig: Rig, logs: Sequence[Experiment]) -> float:

@@ -12,10 +12,13 @@ import numpy as np
 import pytest
 from scipy.signal import cont2discrete, lfilter
 
+from focgen.diagnosis.diagnose import diagnose
+from focgen.fractional.transfer import TransferFunction
 from focgen.identification.identify import identify
 from focgen.identification.stages import identify_stage
 from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
+from focgen.rig.replay import replay
 from focgen.rig.rig import Actuator, Rig, Signals
 
 FINER, STEP, LAG = 20, 0.5, 1.2
@@ -97,3 +100,85 @@ def test_a_step_or_a_rest_says_nothing_of_between_samples():
     made += 0.01 * np.random.default_rng(3).normal(size=600)
     found = identify_stage([Experiment("steps", STEP, {"command": command, "pressure": made})], "regulator")
     assert found.between in (None, Between.HELD) and found.parameters["T"][0] == pytest.approx(LAG, rel=0.01)
+
+
+def behind_a_valve(seed: int, lag: float = 0.2, step: float = 0.1, both: bool = True) -> list[Experiment]:
+    """Two logs of held steps through a valve of ``lag`` s and an actuator of 2 s, with 1 % of noise on the
+    pressure; ``both``: whether the second one has its pressure, too."""
+    rng, logs = np.random.default_rng([seed, 11]), []
+    for i in range(2):
+        command = np.repeat(rng.uniform(0.0, 3.0, 20), 60)
+        command[:60] = 0.0
+        course = np.repeat(command, FINER)
+        lags = [1.0 - np.exp(-step / FINER / tau) for tau in (lag, 2.0)]
+        pressure = lfilter([0.0, lags[0]], [1.0, lags[0] - 1.0], course)
+        made = lfilter([lags[1]], [1.0, lags[1] - 1.0], pressure)[::FINER]
+        noisy = pressure[::FINER] + 0.03 * rng.standard_normal(len(command))
+        signals = {"command": command, "output": made + 0.01 * rng.standard_normal(len(command))}
+        logs.append(Experiment(f"log {i}", step, signals | ({"pressure": noisy} if both or i == 0 else {})))
+    return logs
+
+
+VALVE = Rig(
+    "r",
+    0.1,
+    Signals("t", "y", "u", "p"),
+    Actuator(1.5, 0.95, (1.0,)),
+    regulator=TransferFunction([(1.0, 0.0)], [(0.2, 1.0), (1.0, 0.0)]),
+)
+
+
+@pytest.mark.parametrize("between", [None, Between.HELD])
+@pytest.mark.parametrize("both", [True, False], ids=["pressures", "one pressure"])
+def test_a_command_is_held_beside_a_pressure_too(both, between):
+    """What the regulator makes of it stands beside the pressure, and in its place where a log has none."""
+    rig = replace(VALVE, between=between)
+    found = identify(rig, behind_a_valve(1, both=both), gain_degree=0, integer=False)
+    assert found.rig.between == between
+    assert found.joint.T == pytest.approx(2.0, rel=0.01) and found.joint.alpha == pytest.approx(
+        1.0, abs=0.006
+    )
+
+
+def test_what_the_shapes_lack_of_a_regulator_is_no_other_way_of_a_command():
+    """Three lags, where two and a dead time are tried: a held square wave was taken for a straight one."""
+    course = np.repeat(np.where(np.arange(2400) // 40 % 2 == 1, 2.0, 0.0), FINER)
+    command, made = course[::FINER], course
+    for lag in (0.3, 0.15, 0.1):
+        share = 1.0 - np.exp(-0.1 / FINER / lag)
+        made = lfilter([0.0, share], [1.0, share - 1.0], made)
+    noisy = made[::FINER] + 0.02 * np.random.default_rng(0).standard_normal(len(command))
+    found = identify_stage([Experiment("log", 0.1, {"command": command, "pressure": noisy})], "regulator")
+    assert found.between in (None, Between.HELD) and found.parameters["delay"][0] < 0.08
+
+
+def test_a_lag_is_known_to_half_a_sample_where_ramps_hide_what_a_command_does():
+    """Behind ramps a lag and a sample that is held come to the same."""
+    knots = np.random.default_rng(2).uniform(0.0, 3.0, 25)
+    knots[0] = 0.0
+    fine = np.interp(np.arange(1200 * FINER) / FINER / 50.0, np.arange(25), knots)
+    num, den, _ = cont2discrete(([1.5], [LAG, 1.0]), STEP / FINER, "foh")
+    made = lfilter(np.ravel(num), den, fine)[::FINER] + 0.05 * np.random.default_rng(5).normal(size=1200)
+    found = identify_stage(
+        [Experiment("ramps", STEP, {"command": fine[::FINER], "pressure": made})], "regulator"
+    )
+    lag, half = found.parameters["T"]
+    assert found.between is None and 0.4 * STEP < half < 0.7 * STEP and abs(lag - LAG) < half
+    assert found.time_relative == pytest.approx(half / lag)
+
+
+def test_logs_to_be_shown_run_as_those_that_were_fitted():
+    fitted, (shown,) = logs_of(Between.STRAIGHT, [1, 51], "output"), logs_of(Between.STRAIGHT, [7], "output")
+    found = identify(RIG, fitted, gain_degree=0, integer=False, unseen=[replace(shown, name="shown")])
+    assert found.unseen[0].gof > 0.97
+    assert all(log.gof > 0.97 for log in replay(found.rig, [shown]).logs.values())
+
+
+def test_what_a_rig_says_of_its_command_is_left_where_the_logs_show_another_way():
+    """Other loggers have other ways: a rig of a smooth command was 9 times the noise off held steps."""
+    rig = identify(RIG, logs_of(Between.STRAIGHT, [1, 51], "output"), gain_degree=0, integer=False).rig
+    held, smooth = logs_of(Between.HELD, [3], "output"), logs_of(Between.STRAIGHT, [4], "output")
+    for made in (lambda logs: replay(rig, logs), lambda logs: diagnose(rig, logs, pictures=False)):
+        assert any("but these logs show 'held'" in said for said in made(held).warnings)
+        assert not any("between in" in said for said in made(smooth).warnings)
+    assert replay(rig, held).logs["log 3"].rmse < 0.03
