@@ -135,8 +135,8 @@ def _diagnosed(
 
 
 def _begun_as_it_runs(nominal: Rig, session: tuple[Experiment, ...]) -> tuple[Rig, tuple[Experiment, ...]]:
-    """The session with what was before it, and the rig without what its file says of its input between samples
-    where these logs show something else."""
+    """The session with what was before it, and the rig with what its input does between samples in these logs
+    where that is far from what its file says."""
     begun = begun_session(nominal, session)
     shown = told_between(nominal, begun) if nominal.between is not None else nominal
     return (nominal, begun) if shown == nominal else (shown, begun_session(shown, session))
