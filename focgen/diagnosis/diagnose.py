@@ -36,7 +36,7 @@ from focgen.replaced import check_own
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.initial import in_windows
 from focgen.rig.plausibility import doubts
-from focgen.rig.replay import after_session, experiments, otherwise_between, replay, told_between, with_known
+from focgen.rig.replay import after_session, between_doubted, experiments, replay, with_known
 from focgen.rig.response import with_loops
 from focgen.rig.rig import Rig
 from focgen.rig.stale_zero import with_zero_of
@@ -108,10 +108,10 @@ def _diagnosed(
 ) -> tuple[Diagnosis, Choice | None]:
     """The diagnosis of a session whose signals rise from 0, and the experiment to make next, None where there
     is none; ``ran``: what the session says of its controller."""
-    given = nominal
     nominal, session = decimated(nominal, session)
     session = tuple(told_of_its_loop(log) for log in with_loops(nominal, session))
-    nominal, session = _begun_as_it_runs(nominal, with_readings(session))
+    session = with_readings(session)
+    session = begun_session(nominal, session)
     logged, found = session, found_in(nominal, session, only, bootstrap)
     found = unhidden(found, session, bootstrap) if only is None else found
     nominal, explanations, rigs, session = found.nominal, found.explanations, found.rigs, found.session
@@ -122,24 +122,18 @@ def _diagnosed(
     if only is None:
         explanations, rigs = where_it_is_seen(nominal, explanations, rigs, session)
     rigs, diagnosis, evidence = conclude(nominal, session, rigs, explanations, ran, only is not None)
+    left = gap(rigs.fitted, rigs.placed, session) if diagnosis.causes else None
     proposed = propose(nominal, session, explanations, diagnosis.causes)
     diagnosis = replace(
         diagnosis,
+        notes=diagnosis.notes + between_doubted(rigs.refitted, session, left),
         next_experiment=proposed[0] if proposed else None,
-        warnings=doubts(nominal, with_signals(session, logged)) + otherwise_between(given, nominal),
+        warnings=doubts(nominal, with_signals(session, logged)),
         refitted=rigs.refitted_after(session),
         augmented=rigs.augmented(session, diagnosis.shrink),
         drawn=drawn_of(rigs.refitted, evidence, session),
     )
     return diagnosis, proposed[1] if proposed else None
-
-
-def _begun_as_it_runs(nominal: Rig, session: tuple[Experiment, ...]) -> tuple[Rig, tuple[Experiment, ...]]:
-    """The session with what was before it, and the rig with what its input does between samples in these logs
-    where that is far from what its file says."""
-    begun = begun_session(nominal, session)
-    shown = told_between(nominal, begun) if nominal.between is not None else nominal
-    return (nominal, begun) if shown == nominal else (shown, begun_session(shown, session))
 
 
 def _with_stale_zero(

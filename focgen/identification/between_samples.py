@@ -42,17 +42,18 @@ class Tried(Generic[T]):
 
 @dataclass(frozen=True)
 class Way(Generic[T]):
-    """What a command does ``between`` its samples, and the ``fit`` with it. ``rival``: the fit with another
-    way that is nearly as likely, None where there is none."""
+    """What a command does ``between`` its samples, the ``fit`` with it, and whether that is ``shown`` by the
+    data. ``rival``: the fit with another way that is nearly as likely, None where there is none."""
 
     between: Between
     fit: T
+    shown: bool
     rival: T | None = None
 
     @property
     def known(self) -> Between | None:
         """What it does, None where that does not show."""
-        return self.between if self.rival is None else None
+        return self.between if self.shown else None
 
 
 def likeliest_way(ways: Sequence[Between], tried: Callable[[Between], Tried[T]], rests: bool) -> Way[T]:
@@ -65,10 +66,11 @@ def likeliest_way(ways: Sequence[Between], tried: Callable[[Between], Tried[T]],
     usual, others = tried(ways[0]), [found for way in ways[1:] if (found := _if_fitted(tried, way))]
     closest = min(others, key=lambda other: other.square, default=None)
     if closest is None:
-        return Way(usual.between, usual.fit)
+        return Way(usual.between, usual.fit, shown=len(ways) == 1)
     if is_far_likelier(closest, usual):
-        return Way(closest.between, closest.fit)
-    return Way(usual.between, usual.fit, None if rests or is_far_likelier(usual, closest) else closest.fit)
+        return Way(closest.between, closest.fit, shown=True)
+    shown = is_far_likelier(usual, closest)
+    return Way(usual.between, usual.fit, shown, None if rests or shown else closest.fit)
 
 
 def _if_fitted(tried: Callable[[Between], Tried[T]], way: Between) -> Tried[T] | None:

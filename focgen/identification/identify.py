@@ -161,11 +161,13 @@ def _actuator(
         rig = replace(rig, delays=replace(rig.delays, actuator=0.0))
     check_alike(experiments, rig)
     driven = [e for e in experiments if is_driven(e)]
-    rig, apart = _as_it_runs(driven or experiments, rig, degree, delay)
-    excitations, lowered = _ready(driven or experiments, rig, degree)
+    used = driven or experiments
+    befores = _befores(used, rig, degree + 1)
+    rig, apart = _as_it_runs(used, befores, rig, degree, delay)
+    excitations, lowered = _ready(used, befores, rig, degree)
     fit = fit_fractional(excitations, delay)
     check_determined(excitations, fit)
-    fit = replace(fit, half=fit.half | {name: np.maximum(fit.half[name], by) for name, by in apart.items()})
+    fit = replace(fit, half=fit.half | {name: fit.half[name] + by for name, by in apart.items()})
     excitations = [x.bare() for x in excitations]  # a long log's spectra are large
     fits, failed = fit_each(excitations, fit.pasts, fit.delay, integer)
     joint, compromise = _joint(excitations, fit, fits), is_compromise(excitations, fit)
@@ -188,14 +190,18 @@ def _actuator(
 
 
 def _as_it_runs(
-    experiments: Sequence[Experiment], rig: Rig, degree: int, delay: bool
+    experiments: Sequence[Experiment],
+    befores: Sequence[float | None],
+    rig: Rig,
+    degree: int,
+    delay: bool,
 ) -> tuple[Rig, dict[str, Any]]:
     """The rig with what its command does between samples, where that drives the fit, and by how much each of
     the numbers found is another where it may do something else. Pasts are left to the fit itself: they take
     longest."""
 
     def tried(way: Between) -> Tried[FractionalFit]:
-        ready, _ = _ready(experiments, replace(rig, between=way), degree)
+        ready, _ = _ready(experiments, befores, replace(rig, between=way), degree)
         fit = fit_fractional(ready, delay, pasts=[None] * len(ready))
         left = np.concatenate([(x.measured - y) / x.spread for x, y in zip(ready, fit.simulated)])
         return Tried(way, fit, left)
@@ -206,16 +212,17 @@ def _as_it_runs(
         return rig, {}
     way = likeliest_way(ways, tried, at_rest(commands))
     if way.rival is None:
-        return _running(rig, way.between), {}
+        return _running(rig, way.known), {}
     names = ("T", "alpha", "delay", "gain")
     return rig, {n: np.abs(getattr(way.fit, n) - getattr(way.rival, n)) for n in names}
 
 
 def _ready(
-    experiments: Sequence[Experiment], rig: Rig, degree: int
+    experiments: Sequence[Experiment], befores: Sequence[float | None], rig: Rig, degree: int
 ) -> tuple[list[Excitation], tuple[str, ...]]:
-    """The experiments made ready for a K(p) of the ``degree``, or of one that they show, which it says."""
-    ready = _prepared(experiments, rig, degree + 1)
+    """The experiments, with what the input was before each, made ready for a K(p) of the ``degree``, or of
+    one that they show, which it says."""
+    ready = [prepare(e, rig, degree + 1, before) for e, before in zip(experiments, befores)]
     possible, lowered = feasible_degree(ready, degree)
     return [x.with_powers(possible + 1) for x in ready], lowered
 
@@ -243,25 +250,26 @@ def _zero_told(zero: float, x: Excitation) -> tuple[str, ...]:
     return (f"{held}, in all experiments together: written as the offset of the {stage}",)
 
 
-def _prepared(experiments: Sequence[Experiment], rig: Rig, powers: int) -> list[Excitation]:
-    """The experiments with what was before their first samples: the input they show there for ever, or none
-    where a log begins with the step itself.
+def _befores(experiments: Sequence[Experiment], rig: Rig, powers: int) -> list[float | None]:
+    """What the input of each experiment was before its first sample: what it shows there for ever (None), or
+    0 where a log begins with the step itself.
 
     The second is taken where it needs no further past, and the fit of all experiments leaves little less with
     the first, whatever pasts that asks for.
     """
     ways = [possible_rests(e) for e in experiments]
-    rest, zero = ([prepare(e, rig, powers, way[k]) for e, way in zip(experiments, ways)] for k in (0, -1))
+    firsts: list[float | None] = [way[0] for way in ways]
     if all(len(way) == 1 for way in ways):
-        return rest
+        return firsts
+    rest, zero = ([prepare(e, rig, powers, way[k]) for e, way in zip(experiments, ways)] for k in (0, -1))
     try:
         begun, rested = _fitted(zero), _fitted(rest)
     except FitError:
-        return rest
+        return firsts
     chosen = []
-    for i, (late, early) in enumerate(zip(zero, rest)):
+    for i, (late, early, way) in enumerate(zip(zero, rest, ways)):
         left = [x.measured - fit.simulated[i] for x, fit in ((late, begun), (early, rested))]
-        chosen.append(late if begun.pasts[i] is None and not worth_it(*left) else early)
+        chosen.append(way[-1] if begun.pasts[i] is None and not worth_it(*left) else way[0])
     return chosen
 
 
@@ -304,7 +312,8 @@ def _shown(experiments: Sequence[Experiment], rig: Rig) -> tuple[Unseen, ...]:
     """Logs beside what the identified rig makes of their input, each from the initial state that it asks
     for."""
     actuator: Any = rig.actuator
-    made = [_prepared([e], rig, len(actuator.gain))[0] for e in experiments]
+    powers = len(actuator.gain)
+    made = [prepare(e, rig, powers, _befores([e], rig, powers)[0]) for e in experiments]
     return tuple(
         Unseen(x.name, x.pressure, x.measured, y, gof(x.measured, y), not is_step(x))
         for x, y in ((x, answer_from_its_past(x, actuator, rig.delays.actuator)) for x in made)

@@ -170,7 +170,7 @@ def _as_unsure(chosen: Fitted, others: Sequence[Fitted]) -> Fitted:
         return chosen
     there = other.report.parameters
     wide = {
-        name: (value, max(half, abs(value - there[name][0])) if name in there else half)
+        name: (value, half + abs(value - there[name][0]) if name in there else half)
         for name, (value, half) in chosen.report.parameters.items()
     }
     return replace(chosen, report=replace(chosen.report, parameters=wide))

@@ -38,6 +38,7 @@ from focgen.shown import Shown
 _CLOSER = 0.05  # of the mean square that the usual way of a command leaves: less, and another one is right
 _LEFT_OUT = "the command is left out, which other logs of the session lack: the pressure drives all of them"
 _HELD = 0.5  # the same of a pressure in lines that only jumps and rests: less, and it is held
+_ALIKE = 1.2  # of what effects leave: another way that leaves less may be there instead
 _BESIDES = ("name", "form", "stage", "clock", "carried", "promise", "learned")
 
 
@@ -89,15 +90,13 @@ def replay(rig: RigLike, logs: Logs, from_: float | None = None, to: float | Non
 
 def _replayed(given: Rig, session: Sequence[Experiment]) -> Replay:
     """The replay of a rig whose effects count as its signals are."""
-    told, logs = told_between(given, session), session
-    session = _lasting(told, _with_past(told, logs))
-    if given.between is not None and (again := told_between(told, session)) != told:
-        told, session = again, _lasting(again, _with_past(again, logs))
+    told = told_between(given, session)
+    session = _lasting(told, _with_past(told, session))
     simulated = simulate_session(told, session)
     results = {log.name: _compared(log, made) for log, made in zip(session, simulated)}
     made = {log.name: made for log, made in zip(session, simulated)}
-    said = doubts(told, session) + otherwise_between(given, told)
-    return Replay(results, made, notes_of(session), said, told, tuple(session))
+    notes = notes_of(session) + between_doubted(told, session)
+    return Replay(results, made, notes, doubts(told, session), told, tuple(session))
 
 
 def _with_past(rig: Rig, logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
@@ -174,15 +173,13 @@ def held_by_a_controller(rig: Rig, logs: Sequence[Experiment]) -> Rig:
 
 def told_between(rig: Rig, logs: Sequence[Experiment]) -> Rig:
     """The rig with what its first input does between its samples, where the rig does not say it and the logs
-    do: what :func:`between_of` says, unless the output comes much closer to another way. What the rig says
-    itself is left where it comes much closer to another one: other loggers have other ways. A pressure runs
-    in lines, and may be held where it only jumps and rests."""
-    says = rig.between is not None
+    do: what :func:`between_of` says, unless the output comes much closer to another way. A pressure runs in
+    lines, and may be held where it only jumps and rests."""
     rig, entry = held_by_a_controller(rig, logs), entry_of(logs)
-    if (rig.between is not None and not says) or not all(entry in log and "output" in log for log in logs):
+    if rig.between is not None or not all(entry in log and "output" in log for log in logs):
         return rig
-    usual, likely, closer = between_of(rig, entry), list(Between), _HELD if says else _CLOSER
-    if entry == "pressure" and not says:
+    usual, likely, closer = between_of(rig, entry), list(Between), _CLOSER
+    if entry == "pressure":
         likely, closer = [Between.STRAIGHT, Between.HELD][: 1 + jumps_and_rests(logs, entry)], _HELD
     if len(likely) == 1:
         return rig
@@ -192,12 +189,22 @@ def told_between(rig: Rig, logs: Sequence[Experiment]) -> Rig:
     return ways[closest] if left[closest] < closer * left[0] else rig
 
 
-def otherwise_between(given: Rig, told: Rig) -> tuple[str, ...]:
-    """A warning where the logs have shown another way between samples than the one that a rig says."""
-    if given.between in (None, told.between) or told.between is None:
+def between_doubted(rig: Rig, logs: Sequence[Experiment], found: float | None = None) -> tuple[str, ...]:
+    """A note where a rig says what its command does between samples, and another way leaves far less of the
+    output, or as little as effects do that were ``found`` (the mean square that they leave). What the rig
+    says is kept: whatever is late by half a sample looks alike.
+    """
+    said = rig.between
+    if said is None or not all("command" in log and "output" in log for log in logs):
         return ()
-    says, does = (f"{rig.between.name.lower()!r}" for rig in (given, told) if rig.between is not None)
-    return (f"between in [signals] is {says}, but these logs show {does}, which is taken for them",)
+    left = {way: _left(replace(rig, between=way), logs) for way in Between}
+    closest = min(left, key=lambda way: left[way])
+    if closest == said or left[closest] >= (_HELD * left[said] if found is None else _ALIKE * found):
+        return ()
+    what = f"{closest.name.lower()!r} leaves {left[closest] / left[said]:.0%} of the mean square that it does"
+    remedy = "leave it out where the command of these logs runs otherwise"
+    instead = " without any effect" if found is not None else ""
+    return (f"between = {said.name.lower()!r} in [signals], but{instead} {what}; {remedy}",)
 
 
 def _left(rig: Rig, logs: Sequence[Experiment]) -> float:
