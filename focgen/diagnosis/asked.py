@@ -8,7 +8,7 @@ import numpy as np
 
 from focgen.diagnosis.controller.check import CONTROLLER_EFFECTS
 from focgen.errors import FocgenError, InputError, LogError
-from focgen.logs.experiment import Experiment
+from focgen.logs.experiment import Experiment, check_output
 from focgen.rig.effects import library
 
 EFFECTS = {*library(), *CONTROLLER_EFFECTS}
@@ -17,8 +17,7 @@ EFFECTS = {*library(), *CONTROLLER_EFFECTS}
 def usable(logs: Sequence[Experiment]) -> tuple[Experiment, ...]:
     """The experiments. Raises LogError where they lack a signal or samples, or have gaps."""
     for log in logs:
-        if "output" not in log:
-            raise LogError(log.name, "has no output", "name its column in [signals]")
+        check_output(log)
         if not any(role in log for role in ("command", "pressure")):
             raise LogError(
                 log.name, "has neither command nor pressure", "name the column of the input in [signals]"

@@ -17,7 +17,7 @@ from focgen.fractional.transfer import TransferFunction
 from focgen.identification.kernel import Kernels
 from focgen.identification.smoothed import without_noise
 from focgen.logs.between import Between, Course, course_of, jumps_of, noise_level
-from focgen.logs.experiment import Experiment
+from focgen.logs.experiment import Experiment, check_output
 from focgen.logs.feedback import unlogged_reference
 from focgen.rig.rig import UNITY, Rig
 
@@ -230,6 +230,8 @@ def _varying_reference(experiment: Experiment) -> Array | None:
 
 
 def _check(experiment: Experiment) -> None:
+    if "curvature" not in experiment:
+        check_output(experiment)
     if len(experiment) < _FEWEST:
         raise LogError(experiment.name, f"has {len(experiment)} samples", f"give at least {_FEWEST}")
     fitted = experiment["curvature" if "curvature" in experiment else "output"]

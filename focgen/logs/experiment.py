@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from focgen.arrays import Array, Ints
+from focgen.errors import LogError
 from focgen.logs.begin import REST, Begin
 
 ROLES = ("command", "pressure", "curvature", "output", "reference")
@@ -123,3 +124,9 @@ class Experiment:
         kept = (since >= low) & (since <= high)
         rows = self.rows and {role: values[kept] for role, values in self.rows.items()}
         return self.raw_time[kept], rows
+
+
+def check_output(log: Experiment) -> None:
+    """Raise LogError where an experiment has no output."""
+    if "output" not in log:
+        raise LogError(log.name, "has no output", "name its column in [signals]")

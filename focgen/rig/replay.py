@@ -13,7 +13,7 @@ from focgen.arrays import Array
 from focgen.errors import LogError, RigError
 from focgen.jsontext import UNWRITTEN
 from focgen.logs.between import Between
-from focgen.logs.experiment import Experiment
+from focgen.logs.experiment import Experiment, check_output
 from focgen.logs.feedback import answers_reading
 from focgen.logs.notes import notes_of
 from focgen.logs.rates import at_one_rate
@@ -76,6 +76,8 @@ def replay(rig: RigLike, logs: Logs, from_: float | None = None, to: float | Non
     """
     given = rig_of(rig)
     session = experiments(given, logs, from_, to)
+    for log in session:
+        check_output(log)
     turn = turn_of(given)
     if given.effects and turn:
         turned = _replayed(turn.rig(given), [turn.log(log, given) for log in session])

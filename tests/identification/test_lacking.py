@@ -7,7 +7,8 @@ quantity, or a sensor that is a mere gain is a fault of the program.
 import numpy as np
 import pytest
 
-from focgen.errors import FitError
+import focgen
+from focgen.errors import FitError, LogError
 from focgen.fractional import Convolution, TransferFunction
 from focgen.identification.excitation import prepare
 from focgen.identification.gain import feasible_degree
@@ -16,6 +17,7 @@ from focgen.identification.projected import Problem, uncertainty
 from focgen.identification.rational import Record, Shape
 from focgen.identification.single import is_step
 from focgen.logs.experiment import Experiment
+from focgen.rig.rig import Actuator, Rig, Signals
 from tests.conftest import paper_rig
 
 STEP = 0.05
@@ -83,3 +85,12 @@ def test_a_gain_without_a_dead_time_has_a_derivative_by_one():
     problem = Problem(Shape(0, 0, True), [Record("one", drive, 300.0 * drive + noise, "linear", moves=True)])
     spread, _ = uncertainty(problem, problem.solved(np.array([0.0])))
     assert spread.shape == (2, 2) and np.all(np.diag(spread) > 0.0)
+
+
+@pytest.mark.parametrize("asked", [focgen.identify, focgen.replay, focgen.diagnose])
+def test_a_log_in_memory_without_an_output_is_refused_in_one_line(asked):
+    command = np.repeat(np.random.default_rng(0).uniform(0.0, 2.0, 20), 20)
+    whole = Experiment("whole", 0.1, {"command": command, "output": 0.9 * command})
+    rig = Rig("r", 0.1, Signals("t", "y", "u"), Actuator(1.0, 0.9, (1.0,)))
+    with pytest.raises(LogError, match="blind: has no output; name its column in"):
+        asked(rig, [whole, Experiment("blind", 0.1, {"command": command})])
