@@ -105,6 +105,30 @@ def test_two_others_may_be_there_instead_of_one_that_leaves_more_than_right_form
     assert beside[0].odds < found[0].odds - 0.7
 
 
+def test_what_was_found_is_asked_in_other_forms_beside_others(monkeypatch):
+    """A loop stood alone at 0.01, two others being far likelier: it had not been asked beside an obstacle."""
+    families = ("bend", "creep", "friction", "leak")
+    gap, bend, creep, friction, leak = left(9.0, told=0.9), *(left(5.0, name, told=0.5) for name in families)
+    for of in (bend, creep, friction, leak):
+        vars(of.problem).update(segment=SimpleNamespace(y=np.zeros(10)), coarsest=1)
+        vars(of.problem).update(thinned=lambda factor, p=of.problem: p, stretched=lambda vector, times: None)
+    every = [SimpleNamespace(effect=name, form=SimpleNamespace(slot="load")) for name in families]
+
+    def rank(problem, vector, candidates):
+        of = problem.families[0]
+        return ranking(None, *(left(1.0, of, c.effect, told=0.0) for c in reversed(candidates)))
+
+    monkeypatch.setattr(two, "rank", rank)
+    monkeypatch.setattr(two, "on_all", lambda both, problem, factor: both)
+    monkeypatch.setattr(two, "_in_the_plant", lambda candidate: False)
+    pairs = list(two._pairs(bend, ranking(gap, bend, creep, friction, leak), every))
+    asked_of = {
+        one: [f.problem.families[1] for f in pairs if f.problem.families[0] == one] for one in families
+    }
+    assert asked_of["bend"] == ["leak", "friction"]  # the two likeliest beside it
+    assert all("bend" in beside and len(beside) == 3 for one, beside in asked_of.items() if one != "bend")
+
+
 def test_what_two_others_may_be_is_taken_from_a_confidence_and_said():
     pairs = [two.TwoOthers("softening", frozenset({"drift", "rail"}), np.log(0.5))]
     pairs.append(two.TwoOthers("softening", frozenset({"creep", "rail"}), np.log(0.25)))
