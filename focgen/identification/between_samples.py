@@ -18,10 +18,9 @@ from focgen.logs.between import Between
 T = TypeVar("T")
 
 _RESTS = 0.5  # of a command's samples at which it rests: then it is no smooth curve
-_SURELY = 20.0  # to one: another way than held has to be likelier by that,
-_LESS = (
-    0.95  # and leave so much of the mean square at most: what a model lacks of a rig, chance does not make
-)
+# another way than held has to be likelier by _SURELY to one, and to leave no more than _LESS of the mean
+# square: with many samples what a model lacks of the rig makes any odds
+_SURELY, _LESS = 20.0, 0.95
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from focgen.diagnosis.diagnose import diagnose
 from focgen.fractional.transfer import TransferFunction
 from focgen.identification.identify import identify
 from focgen.identification.stages import identify_stage
-from focgen.logs.between import Between
+from focgen.logs.between import Between, course_of
 from focgen.logs.experiment import Experiment
 from focgen.rig.replay import replay
 from focgen.rig.rig import Actuator, Rig, Signals
@@ -152,16 +152,18 @@ def test_what_the_shapes_lack_of_a_regulator_is_no_other_way_of_a_command():
     assert found.between in (None, Between.HELD) and found.parameters["delay"][0] < 0.08
 
 
-def test_a_lag_is_known_to_half_a_sample_where_ramps_hide_what_a_command_does():
-    """Behind ramps a lag and a sample that is held come to the same."""
+def ramps(role: str) -> Experiment:
+    """A command in ramps, and what a lag of ``LAG`` s makes of it: of a held one it comes to the same."""
     knots = np.random.default_rng(2).uniform(0.0, 3.0, 25)
     knots[0] = 0.0
     fine = np.interp(np.arange(1200 * FINER) / FINER / 50.0, np.arange(25), knots)
     num, den, _ = cont2discrete(([1.5], [LAG, 1.0]), STEP / FINER, "foh")
     made = lfilter(np.ravel(num), den, fine)[::FINER] + 0.05 * np.random.default_rng(5).normal(size=1200)
-    found = identify_stage(
-        [Experiment("ramps", STEP, {"command": fine[::FINER], "pressure": made})], "regulator"
-    )
+    return Experiment("ramps", STEP, {"command": fine[::FINER], role: made})
+
+
+def test_a_lag_is_known_to_half_a_sample_where_ramps_hide_what_a_command_does():
+    found = identify_stage([ramps("pressure")], "regulator")
     lag, half = found.parameters["T"]
     assert found.between is None and 0.4 * STEP < half < 0.7 * STEP and abs(lag - LAG) < half
     assert found.time_relative == pytest.approx(half / lag)
@@ -195,3 +197,26 @@ def test_a_delay_of_a_sample_is_found_in_a_rig_that_says_how_its_command_runs(wa
     found = diagnose(replace(rig, between=way), late, pictures=False)
     assert [cause.candidates[0].effect for cause in found.causes] == ["transport_delay"]
     assert not any("between =" in said for said in found.notes)
+
+
+def test_an_actuator_is_known_to_half_a_sample_where_ramps_hide_what_a_command_does():
+    found = identify(RIG, [ramps("output")], gain_degree=0, integer=False)
+    low, high = found.joint.ci95["T"]
+    assert found.rig.between is None and low < LAG < high and high - low > 0.6 * STEP
+    assert found.rig.uncertainty.actuator.time > 0.2 * STEP / LAG
+
+
+def test_a_regulator_is_fitted_as_its_rig_says_that_its_command_runs():
+    logs = logs_of(Between.STRAIGHT, [1, 51], "pressure")
+    said = identify(replace(RIG, between=Between.HELD), logs, stages=["regulator"])
+    assert said.stages["regulator"].parameters["T"][0] < 0.9 * LAG
+    free = identify(RIG, logs, stages=["regulator"])
+    assert free.rig.between == Between.STRAIGHT
+    assert free.stages["regulator"].parameters["T"][0] == pytest.approx(LAG, rel=0.02)
+
+
+def test_straight_lines_have_no_bends():
+    values = np.sin(np.arange(60.0) / 5.0)[None]
+    lines, curve = (course_of(values, np.zeros(60, bool), way) for way in (Between.STRAIGHT, Between.SMOOTH))
+    assert lines.bends is None and curve.bends is not None
+    assert np.array_equal(lines.straight[0, 1:], np.diff(values[0]))
