@@ -108,6 +108,7 @@ def _diagnosed(
 ) -> tuple[Diagnosis, Choice | None]:
     """The diagnosis of a session whose signals rise from 0, and the experiment to make next, None where there
     is none; ``ran``: what the session says of its controller."""
+    given = nominal
     nominal, session = decimated(nominal, session)
     session = tuple(told_of_its_loop(log) for log in with_loops(nominal, session))
     session = with_readings(session)
@@ -123,10 +124,11 @@ def _diagnosed(
         explanations, rigs = where_it_is_seen(nominal, explanations, rigs, session)
     rigs, diagnosis, evidence = conclude(nominal, session, rigs, explanations, ran, only is not None)
     left = gap(rigs.fitted, rigs.placed, session) if diagnosis.causes else None
+    said = replace(rigs.refitted, between=given.between)
     proposed = propose(nominal, session, explanations, diagnosis.causes)
     diagnosis = replace(
         diagnosis,
-        notes=diagnosis.notes + between_doubted(rigs.refitted, session, left),
+        notes=diagnosis.notes + between_doubted(said, session, left),
         next_experiment=proposed[0] if proposed else None,
         warnings=doubts(nominal, with_signals(session, logged)),
         refitted=rigs.refitted_after(session),

@@ -97,7 +97,7 @@ def _replayed(given: Rig, session: Sequence[Experiment]) -> Replay:
     simulated = simulate_session(told, session)
     results = {log.name: _compared(log, made) for log, made in zip(session, simulated)}
     made = {log.name: made for log, made in zip(session, simulated)}
-    notes = notes_of(session) + between_doubted(told, session)
+    notes = notes_of(session) + between_doubted(given, session)
     return Replay(results, made, notes, doubts(told, session), told, tuple(session))
 
 
@@ -199,7 +199,7 @@ def between_doubted(rig: Rig, logs: Sequence[Experiment], found: float | None = 
     said = rig.between
     if said is None or not all("command" in log and "output" in log for log in logs):
         return ()
-    left = {way: _left(replace(rig, between=way), logs) for way in Between}
+    left = {way: _left(replace(rig, between=way), logs) for way in {Between.HELD, Between.STRAIGHT, said}}
     closest = min(left, key=lambda way: left[way])
     if closest == said or left[closest] >= (_HELD * left[said] if found is None else _ALIKE * found):
         return ()
