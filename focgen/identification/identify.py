@@ -12,32 +12,29 @@ import numpy as np
 from focgen.arguments import checked
 from focgen.custody import identified_from
 from focgen.errors import FitError, LogError, check_choice
-from focgen.identification.between_samples import Tried, at_rest, likeliest_way, ways_of
 from focgen.identification.caveats import effects_left_out, warnings_of
 from focgen.identification.digits import told_gain, told_value
-from focgen.identification.excitation import Excitation, is_driven, possible_rests, prepare
+from focgen.identification.excitation import Excitation, is_driven, prepare
 from focgen.identification.form import lack_of_form
 from focgen.identification.fractional import FractionalFit, fit_fractional
-from focgen.identification.gain import check_degree, feasible_degree, r2_of_line
+from focgen.identification.gain import check_degree, r2_of_line
 from focgen.identification.identification import ExperimentFit, Identification, Joint, Unseen
 from focgen.identification.known_actuator import answer_from_its_past
 from focgen.identification.lacking import check_alike
-from focgen.identification.past import worth_it
 from focgen.identification.quality import bic, effective_samples, gof
 from focgen.identification.ranges import seen_ranges
+from focgen.identification.ready import as_it_runs, befores_of, ready_for, running
 from focgen.identification.remarks import remarks_of
 from focgen.identification.single import fit_each, is_step
 from focgen.identification.stages import StageFit, identify_stage
 from focgen.identification.sure import actuator_uncertainty, check_determined, is_compromise, with_stages
 from focgen.identification.zero import shared_zero
-from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import listed
 from focgen.logs.rates import at_one_rate
 from focgen.logs.read import Logs, digest_of, each_of, read_logs
 from focgen.output import check_apart, write_file
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
-from focgen.rig.engine import between_of
 from focgen.rig.files import check_replaces_rig, rig_text
 from focgen.rig.plausibility import doubts
 from focgen.rig.response import check_bounded, longest
@@ -138,14 +135,7 @@ def _with_stages(rig: Rig, found: dict[str, StageFit]) -> Rig:
     delays = replace(rig.delays, **{name: fit.delay for name, fit in found.items()})
     transfers: dict[str, Any] = {name: fit.transfer for name, fit in found.items()}
     rig = replace(rig, delays=delays, uncertainty=with_stages(rig.uncertainty, found), **transfers)
-    return _running(rig, found["regulator"].between) if "regulator" in found else rig
-
-
-def _running(rig: Rig, between: Between | None) -> Rig:
-    """The rig with what its command does between samples, where that is known and not what a rig that says
-    nothing is taken for everywhere: a regulator whose command is held."""
-    usual = rig.between is None and between == Between.HELD == between_of(rig, "command")
-    return rig if between is None or usual else replace(rig, between=between)
+    return running(rig, found["regulator"].between) if "regulator" in found else rig
 
 
 def _actuator(
@@ -162,9 +152,9 @@ def _actuator(
     check_alike(experiments, rig)
     driven = [e for e in experiments if is_driven(e)]
     used = driven or experiments
-    befores = _befores(used, rig, degree + 1)
-    rig, apart = _as_it_runs(used, befores, rig, degree, delay)
-    excitations, lowered = _ready(used, befores, rig, degree)
+    befores = befores_of(used, rig, degree + 1)
+    rig, apart = as_it_runs(used, befores, rig, degree, delay)
+    excitations, lowered = ready_for(used, befores, rig, degree)
     fit = fit_fractional(excitations, delay)
     check_determined(excitations, fit)
     fit = replace(fit, half=fit.half | {name: fit.half[name] + by for name, by in apart.items()})
@@ -189,44 +179,6 @@ def _actuator(
     return Identification(tuple(fits), joint, new, quality, criterion, warnings, told, shown)
 
 
-def _as_it_runs(
-    experiments: Sequence[Experiment],
-    befores: Sequence[float | None],
-    rig: Rig,
-    degree: int,
-    delay: bool,
-) -> tuple[Rig, dict[str, Any]]:
-    """The rig with what its command does between samples, where that drives the fit, and by how much each of
-    the numbers found is another where it may do something else. Pasts are left to the fit itself: they take
-    longest."""
-
-    def tried(way: Between) -> Tried[FractionalFit]:
-        ready, _ = _ready(experiments, befores, replace(rig, between=way), degree)
-        fit = fit_fractional(ready, delay, pasts=[None] * len(ready))
-        left = np.concatenate([(x.measured - y) / x.spread for x, y in zip(ready, fit.simulated)])
-        return Tried(way, fit, left)
-
-    commands = [e["command"] for e in experiments if "pressure" not in e]
-    ways = ways_of(rig.between, commands) if len(commands) == len(experiments) else ()
-    if len(ways) < 2:
-        return rig, {}
-    way = likeliest_way(ways, tried, at_rest(commands))
-    if way.rival is None:
-        return _running(rig, way.known), {}
-    names = ("T", "alpha", "delay", "gain")
-    return rig, {n: np.abs(getattr(way.fit, n) - getattr(way.rival, n)) for n in names}
-
-
-def _ready(
-    experiments: Sequence[Experiment], befores: Sequence[float | None], rig: Rig, degree: int
-) -> tuple[list[Excitation], tuple[str, ...]]:
-    """The experiments, with what the input was before each, made ready for a K(p) of the ``degree``, or of
-    one that they show, which it says."""
-    ready = [prepare(e, rig, degree + 1, before) for e, before in zip(experiments, befores)]
-    possible, lowered = feasible_degree(ready, degree)
-    return [x.with_powers(possible + 1) for x in ready], lowered
-
-
 def _told(experiments: Sequence[Experiment], excitations: list[Excitation]) -> tuple[str, ...]:
     """What the experiments were taken for."""
     told, used = [], {x.name for x in excitations}
@@ -248,34 +200,6 @@ def _zero_told(zero: float, x: Excitation) -> tuple[str, ...]:
     stage = "sensor" if x.fitted_role == "output" else "actuator"
     held = f"where the {x.input_role} is 0 the {x.fitted_role} is {zero:g}"
     return (f"{held}, in all experiments together: written as the offset of the {stage}",)
-
-
-def _befores(experiments: Sequence[Experiment], rig: Rig, powers: int) -> list[float | None]:
-    """What the input of each experiment was before its first sample: what it shows there for ever (None), or
-    0 where a log begins with the step itself.
-
-    The second is taken where it needs no further past, and the fit of all experiments leaves little less with
-    the first, whatever pasts that asks for.
-    """
-    ways = [possible_rests(e) for e in experiments]
-    firsts: list[float | None] = [way[0] for way in ways]
-    if all(len(way) == 1 for way in ways):
-        return firsts
-    rest, zero = ([prepare(e, rig, powers, way[k]) for e, way in zip(experiments, ways)] for k in (0, -1))
-    try:
-        begun, rested = _fitted(zero), _fitted(rest)
-    except FitError:
-        return firsts
-    chosen = []
-    for i, (late, early, way) in enumerate(zip(zero, rest, ways)):
-        left = [x.measured - fit.simulated[i] for x, fit in ((late, begun), (early, rested))]
-        chosen.append(way[-1] if begun.pasts[i] is None and not worth_it(*left) else way[0])
-    return chosen
-
-
-def _fitted(excitations: list[Excitation]) -> FractionalFit:
-    degree, _ = feasible_degree(excitations, excitations[0].powers - 1)
-    return fit_fractional([x.with_powers(degree + 1) for x in excitations])
 
 
 def _joint(excitations: list[Excitation], fit: FractionalFit, fits: list[ExperimentFit]) -> Joint:
@@ -313,7 +237,7 @@ def _shown(experiments: Sequence[Experiment], rig: Rig) -> tuple[Unseen, ...]:
     for."""
     actuator: Any = rig.actuator
     powers = len(actuator.gain)
-    made = [prepare(e, rig, powers, _befores([e], rig, powers)[0]) for e in experiments]
+    made = [prepare(e, rig, powers, befores_of([e], rig, powers)[0]) for e in experiments]
     return tuple(
         Unseen(x.name, x.pressure, x.measured, y, gof(x.measured, y), not is_step(x))
         for x, y in ((x, answer_from_its_past(x, actuator, rig.delays.actuator)) for x in made)

@@ -19,6 +19,7 @@ from focgen.identification.gain import secants_of
 from focgen.identification.integer import SHAPES, fit_integer_models
 from focgen.identification.kernel import kernels
 from focgen.identification.quality import gof
+from focgen.identification.ready import befores_of
 from focgen.logs.between import course_of, jumps_of
 from focgen.logs.experiment import Experiment
 from tests.conftest import paper_rig
@@ -372,8 +373,8 @@ def test_a_log_that_is_shown_but_not_fitted_may_begin_in_a_transient():
 def test_an_input_that_is_up_at_first_has_stepped_there_only_where_the_answer_begins_there():
     rng = np.random.default_rng(1)
     log = step_log(release=21.0, noise=0.01 * K * LEVEL * rng.normal(size=2050))
-    assert module._befores([later(log, 1.0)], paper_rig(), 1) == [0.0]
-    assert module._befores([later(log, 3.0)], paper_rig(), 1) == [None]
+    assert befores_of([later(log, 1.0)], paper_rig(), 1) == [0.0]
+    assert befores_of([later(log, 3.0)], paper_rig(), 1) == [None]
 
 
 def test_a_misfit_is_not_blamed_on_short_holds():
