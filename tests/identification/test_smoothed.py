@@ -2,7 +2,7 @@
 
 The truth is simulated here: a real order driven by sines, on a grid ten times finer.
 
-Red when noise on a measured pressure passes for dynamics: an order of 0.36 was 0.54, and known to 0.05.
+Red when noise on a measured pressure passes for dynamics: an order of 0.36 was 0.45, and known to 0.02.
 """
 
 import numpy as np
