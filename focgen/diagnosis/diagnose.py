@@ -23,7 +23,7 @@ from focgen.diagnosis.problem.decimate import decimated
 from focgen.diagnosis.proposals.menu import Choice
 from focgen.diagnosis.proposals.next_experiment import NEXT, propose
 from focgen.diagnosis.turned import turned_back
-from focgen.diagnosis.verdict.compose import gap
+from focgen.diagnosis.verdict.compose import Rigs, gap
 from focgen.diagnosis.verdict.conclude import conclude
 from focgen.diagnosis.verdict.evidence import drawn_of
 from focgen.diagnosis.verdict.in_between import with_signals
@@ -123,12 +123,10 @@ def _diagnosed(
     if only is None:
         explanations, rigs = where_it_is_seen(nominal, explanations, rigs, session)
     rigs, diagnosis, evidence = conclude(nominal, session, rigs, explanations, ran, only is not None)
-    left = gap(rigs.fitted, rigs.placed, session) if diagnosis.causes else None
-    said = replace(rigs.refitted, between=given.between)
     proposed = propose(nominal, session, explanations, diagnosis.causes)
     diagnosis = replace(
         diagnosis,
-        notes=diagnosis.notes + between_doubted(said, session, left),
+        notes=diagnosis.notes + _between_doubted(given, rigs, session, bool(diagnosis.causes)),
         next_experiment=proposed[0] if proposed else None,
         warnings=doubts(nominal, with_signals(session, logged)),
         refitted=rigs.refitted_after(session),
@@ -136,6 +134,15 @@ def _diagnosed(
         drawn=drawn_of(rigs.refitted, evidence, session),
     )
     return diagnosis, proposed[1] if proposed else None
+
+
+def _between_doubted(given: Rig, rigs: Rigs, session: tuple[Experiment, ...], named: bool) -> tuple[str, ...]:
+    """The note where another way between samples than the rig as ``given`` says does as well as what was
+    ``named``, or far better than nothing."""
+    if given.between is None:
+        return ()
+    left = gap(rigs.fitted, rigs.placed, session) if named else None
+    return between_doubted(replace(rigs.refitted, between=given.between), session, left)
 
 
 def _with_stale_zero(

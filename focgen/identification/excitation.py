@@ -183,7 +183,8 @@ def prepare(experiment: Experiment, rig: Rig, powers: int = 1, before: float | N
     first sample (None: as at the first sample). Raises LogError where a signal is constant or too short.
     """
     _check(experiment)
-    pressure, level_before, jumps, between, role = _input(experiment, rig, before)
+    reference = _varying_reference(experiment)
+    pressure, level_before, jumps, between, role = _input(experiment, rig, before, reference is not None)
     above = np.array([pressure**m - level_before**m for m in range(1, powers + 1)])
     course = course_of(above, jumps, between)
     fitted = "curvature" if "curvature" in experiment else "output"
@@ -204,7 +205,7 @@ def prepare(experiment: Experiment, rig: Rig, powers: int = 1, before: float | N
         sensor,
         experiment.notes,
         before is None,
-        _varying_reference(experiment),
+        reference,
         rig.delays.regulator * (role == "command") + rig.delays.sensor * (fitted == "output"),
         abs(level_before) > _AT_REST * float(np.abs(pressure).max()),
     )
@@ -262,11 +263,12 @@ def is_driven(experiment: Experiment) -> bool:
 
 
 def _input(
-    experiment: Experiment, rig: Rig, before: float | None
+    experiment: Experiment, rig: Rig, before: float | None, closed: bool
 ) -> tuple[Array, float, Bools, Between, str]:
-    """The actuator's input: (samples, value before them, where it jumps, what it does between, its role)."""
+    """The actuator's input: (samples, value before them, where it jumps, what it does between, its role);
+    ``closed``: in a loop."""
     if "pressure" in experiment:
-        values, jumps = _measured(experiment, rig)
+        values, jumps = _measured(experiment, rig, closed)
         rest = _rest_of(experiment["pressure"]) if before is None else before
         if before is None:
             values = np.concatenate([[rest], values[1:]])  # the first sample's noise is no step
@@ -283,12 +285,12 @@ def _input(
     return gain * rest + moved, gain * rest, none, Between.SMOOTH, "command"
 
 
-def _measured(experiment: Experiment, rig: Rig) -> tuple[Array, Bools]:
+def _measured(experiment: Experiment, rig: Rig, closed: bool) -> tuple[Array, Bools]:
     """The measured pressure without its noise, and where it jumps. What a controller makes of noise moves the
     rig: in a closed loop it is as it was measured."""
     values = experiment["pressure"]
     jumps = jumps_of(values)
-    if _varying_reference(experiment) is not None:
+    if closed:
         return values, jumps
     known = _by_regulator(experiment, rig)
     smooth = without_noise(values, jumps, known)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -87,13 +88,11 @@ def identify_stage(experiments: Sequence[Experiment], stage: str, between: Betwe
     check_choice("--stages", stage, _SIGNALS, FitError)
     used = _usable(experiments, stage)
     step = used[0].sample_time
-    _check([_record(e, stage, Between.HELD) for e in used], stage)
-    way = likeliest_way(
-        _ways(used, stage, between),
-        lambda way: _tried([_record(e, stage, way) for e in used], step, way),
-        at_rest([e[_SIGNALS[stage][0]] for e in used]),
-    )
-    records, fits = [_record(e, stage, way.between) for e in used], way.fit
+    ways, made = _ways(used, stage, between), cache(lambda way: [_record(e, stage, way) for e in used])
+    _check(made(ways[0]), stage)
+    rests = at_rest([e[_SIGNALS[stage][0]] for e in used])
+    way = likeliest_way(ways, lambda way: _tried(made(way), step, way), rests)
+    records, fits = made(way.between), way.fit
     short = choose(fits)
     up_down, short = fit_directions(fits, short, step)
     chosen = refit(short, records, step) if sum(map(len, records)) > _MOST else short

@@ -308,6 +308,15 @@ def test_noise_that_is_told_from_a_smooth_curvature_takes_little_of_the_gain():
     assert fit.parameters["gain"][0] == pytest.approx(1.5, rel=0.4 * share)
 
 
+def test_noise_too_large_to_be_told_from_the_curvature_takes_of_the_gain_and_a_note_says_so():
+    true = 0.001 * np.sin(np.outer([0.02, 0.05, 0.11, 0.19], np.arange(3000))).sum(axis=0)
+    fit, expected = static_sensor(true, noise=0.00032)
+    assert expected > 0.04
+    assert fit.parameters["gain"][0] == pytest.approx(1.5 * (1.0 - expected), rel=0.006)
+    note = next(n for n in fit.notes if "smaller" in n)
+    assert float(note.split("up to ")[1].split("%")[0]) == pytest.approx(100.0 * expected, rel=0.3)
+
+
 def test_what_noise_takes_of_a_gain_where_the_curvature_is_as_quick_as_noise():
     true = 0.001 * np.random.default_rng(7).standard_normal(3000)
     fit, expected = static_sensor(true)
