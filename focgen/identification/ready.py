@@ -88,7 +88,7 @@ def as_it_runs(
 
 
 def running(rig: Rig, between: Between | None) -> Rig:
-    """The rig with what its command does between samples, where that is known and not what a rig that says
-    nothing is taken for everywhere: a regulator whose command is held."""
-    usual = rig.between is None and between == Between.HELD == between_of(rig, "command")
-    return rig if between is None or usual else replace(rig, between=between)
+    """The rig with what its command does between samples, where its file does not say it, and that is known
+    and not what a rig that says nothing is taken for everywhere: a regulator whose command is held."""
+    usual = between == Between.HELD == between_of(rig, "command")
+    return rig if between is None or usual or rig.between is not None else replace(rig, between=between)

@@ -210,6 +210,8 @@ def test_a_regulator_is_fitted_as_its_rig_says_that_its_command_runs():
     logs = logs_of(Between.STRAIGHT, [1, 51], "pressure")
     said = identify(replace(RIG, between=Between.HELD), logs, stages=["regulator"])
     assert said.stages["regulator"].parameters["T"][0] < 0.9 * LAG
+    smooth = identify(replace(RIG, between=Between.SMOOTH), logs, stages=["regulator"])
+    assert (said.rig.between, smooth.rig.between) == (Between.HELD, Between.SMOOTH)
     free = identify(RIG, logs, stages=["regulator"])
     assert free.rig.between == Between.STRAIGHT
     assert free.stages["regulator"].parameters["T"][0] == pytest.approx(LAG, rel=0.02)
