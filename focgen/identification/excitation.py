@@ -19,6 +19,7 @@ from focgen.identification.smoothed import without_noise
 from focgen.logs.between import Between, Course, course_of, jumps_of, noise_level
 from focgen.logs.experiment import Experiment, check_output
 from focgen.logs.feedback import unlogged_reference
+from focgen.rig import kernels
 from focgen.rig.rig import UNITY, Rig
 
 _AT_REST = 0.02  # of the input's largest value: closer to 0 than this it starts at rest at 0
@@ -175,17 +176,21 @@ class Driven:
         return fft.irfft(spectrum, self.size)[:, : self.count - 1] if np.ndim(spectrum) else 0.0
 
 
-def prepare(experiment: Experiment, rig: Rig, powers: int = 1, before: float | None = None) -> Excitation:
+def prepare(
+    experiment: Experiment, rig: Rig, powers: int = 1, before: float | None = None, play: float = 0.0
+) -> Excitation:
     """Make an experiment ready for fitting.
 
     Input is the measured pressure where logged, else the command through the regulator; fitted is the
     curvature where logged, else the output through the sensor. ``before`` is the input's value ahead of the
-    first sample (None: as at the first sample). Raises LogError where a signal is constant or too short.
+    first sample (None: as at the first sample). ``play``: by how much the drive trails its input, units of
+    it. Raises LogError where a signal is constant or too short.
     """
     _check(experiment)
     reference = _varying_reference(experiment)
     pressure, level_before, jumps, between, role = _input(experiment, rig, before, reference is not None)
-    above = np.array([pressure**m - level_before**m for m in range(1, powers + 1)])
+    drive = _trailing(pressure, level_before, play) if play else pressure
+    above = np.array([drive**m - level_before**m for m in range(1, powers + 1)])
     course = course_of(above, jumps, between)
     fitted = "curvature" if "curvature" in experiment else "output"
     sensor = rig.sensor if fitted == "output" else UNITY
@@ -209,6 +214,12 @@ def prepare(experiment: Experiment, rig: Rig, powers: int = 1, before: float | N
         rig.delays.regulator * (role == "command") + rig.delays.sensor * (fitted == "output"),
         abs(level_before) > _AT_REST * float(np.abs(pressure).max()),
     )
+
+
+def _trailing(pressure: Array, before: float, play: float) -> Array:
+    """What a play of half width ``play`` makes of the input (n,), in the middle of its slack ahead of it."""
+    never = np.zeros(len(pressure), np.uint8)
+    return before + kernels.play(pressure - before, never, play)
 
 
 def possible_rests(experiment: Experiment) -> tuple[float | None, ...]:

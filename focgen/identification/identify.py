@@ -16,18 +16,19 @@ from focgen.identification.caveats import effects_left_out, warnings_of
 from focgen.identification.digits import told_gain, told_value
 from focgen.identification.excitation import Excitation, is_driven, prepare
 from focgen.identification.form import lack_of_form
-from focgen.identification.fractional import FractionalFit, fit_fractional
+from focgen.identification.fractional import FractionalFit
 from focgen.identification.gain import check_degree, r2_of_line
 from focgen.identification.identification import ExperimentFit, Identification, Joint, Unseen
 from focgen.identification.known_actuator import answer_from_its_past
 from focgen.identification.lacking import check_alike
+from focgen.identification.looped import Fitted, again, fitted, loop_told
 from focgen.identification.quality import bic, effective_samples, gof
 from focgen.identification.ranges import seen_ranges
 from focgen.identification.ready import as_it_runs, befores_of, ready_for, running
 from focgen.identification.remarks import remarks_of
 from focgen.identification.single import fit_each, is_step
 from focgen.identification.stages import StageFit, identify_stage
-from focgen.identification.sure import actuator_uncertainty, check_determined, is_compromise, with_stages
+from focgen.identification.sure import actuator_uncertainty, is_compromise, with_stages
 from focgen.identification.zero import shared_zero
 from focgen.logs.experiment import Experiment
 from focgen.logs.notes import listed
@@ -153,15 +154,13 @@ def _actuator(
     driven = [e for e in experiments if is_driven(e)]
     used = driven or experiments
     befores = befores_of(used, rig, degree + 1)
-    rig, apart = as_it_runs(used, befores, rig, degree, delay)
-    excitations, lowered = ready_for(used, befores, rig, degree)
-    fit = fit_fractional(excitations, delay)
-    check_determined(excitations, fit)
-    fit = replace(fit, half=fit.half | {name: fit.half[name] + by for name, by in apart.items()})
+    rig, found, lowered = _fitted(used, befores, rig, degree, delay)
+    excitations, fit = found.excitations, found.fit
     excitations = [x.bare() for x in excitations]  # a long log's spectra are large
     fits, failed = fit_each(excitations, fit.pasts, fit.delay, integer)
     joint, compromise = _joint(excitations, fit, fits), is_compromise(excitations, fit)
-    known = replace(actuator_uncertainty(excitations, fit, compromise), form=lack_of_form(excitations, fit))
+    loosely = compromise or found.width > 0.0  # a play is no rig's loop to the letter
+    known = replace(actuator_uncertainty(excitations, fit, loosely), form=lack_of_form(excitations, fit))
     zero, of_sensor = shared_zero(excitations, fit), excitations[0].fitted_role == "output"
     new = replace(
         rig,
@@ -172,11 +171,26 @@ def _actuator(
     )
     quality, criterion = _compared(excitations, fits, joint)
     shown = _shown(others, new)
-    warnings = warnings_of(excitations, fit, fits, failed, quality)
+    warnings = loop_told(found) + warnings_of(excitations, fit, fits, failed, quality)
     told = lowered + _told(experiments, excitations) + _zero_told(zero, excitations[0])
     if compromise:
         told += (_COMPROMISE,)
     return Identification(tuple(fits), joint, new, quality, criterion, warnings, told, shown)
+
+
+def _fitted(
+    used: Sequence[Experiment], befores: Sequence[float | None], rig: Rig, degree: int, delay: bool
+) -> tuple[Rig, Fitted, tuple[str, ...]]:
+    """The rig with what its command does between samples, the fit, with all that its intervals allow for, and
+    whether the degree was lowered."""
+    runs, apart = as_it_runs(used, befores, rig, degree, delay)
+    _, lowered = ready_for(used, befores, runs, degree)
+    found = fitted(lambda play: ready_for(used, befores, runs, degree, play)[0], delay)
+    if found.width:  # what a command does shows beside the loop alone
+        runs, apart = as_it_runs(used, befores, rig, degree, delay, found.width)
+        found = again(found, ready_for(used, befores, runs, degree, found.width)[0], delay)
+    half = {name: found.fit.half[name] + by for name, by in apart.items()}
+    return runs, replace(found, fit=replace(found.fit, half=found.fit.half | half)), lowered
 
 
 def _told(experiments: Sequence[Experiment], excitations: list[Excitation]) -> tuple[str, ...]:

@@ -50,11 +50,15 @@ def _fitted(excitations: list[Excitation]) -> FractionalFit:
 
 
 def ready_for(
-    experiments: Sequence[Experiment], befores: Sequence[float | None], rig: Rig, degree: int
+    experiments: Sequence[Experiment],
+    befores: Sequence[float | None],
+    rig: Rig,
+    degree: int,
+    play: float = 0.0,
 ) -> tuple[list[Excitation], tuple[str, ...]]:
     """The experiments, with what the input was before each, made ready for a K(p) of the ``degree``, or of
-    one that they show, which it says."""
-    ready = [prepare(e, rig, degree + 1, before) for e, before in zip(experiments, befores)]
+    one that they show, which it says; ``play``: by how much the drive trails its input."""
+    ready = [prepare(e, rig, degree + 1, before, play) for e, before in zip(experiments, befores)]
     possible, lowered = feasible_degree(ready, degree)
     return [x.with_powers(possible + 1) for x in ready], lowered
 
@@ -65,13 +69,14 @@ def as_it_runs(
     rig: Rig,
     degree: int,
     delay: bool,
+    play: float = 0.0,
 ) -> tuple[Rig, dict[str, Any]]:
     """The rig with what its command does between samples, where that drives the fit, and by how much each of
     the numbers found is another where it may do something else. Pasts are left to the fit itself: they take
-    longest."""
+    longest. ``play``: by how much the drive trails its input."""
 
     def tried(way: Between) -> Tried[FractionalFit]:
-        ready, _ = ready_for(experiments, befores, replace(rig, between=way), degree)
+        ready, _ = ready_for(experiments, befores, replace(rig, between=way), degree, play)
         fit = fit_fractional(ready, delay, pasts=[None] * len(ready))
         left = np.concatenate([(x.measured - y) / x.spread for x, y in zip(ready, fit.simulated)])
         return Tried(way, fit, left)
@@ -80,7 +85,10 @@ def as_it_runs(
     ways = ways_of(rig.between, commands) if len(commands) == len(experiments) else ()
     if len(ways) < 2:
         return rig, {}
-    way = likeliest_way(ways, tried, at_rest(commands))
+    try:
+        way = likeliest_way(ways, tried, at_rest(commands))
+    except FitError:  # without numbers nothing tells the ways apart: the fit itself says so, or finds a loop
+        return rig, {}
     if way.rival is None:
         return running(rig, way.known), {}
     names = ("T", "alpha", "delay", "gain")[: 4 if len(way.fit.gain) == len(way.rival.gain) else 3]

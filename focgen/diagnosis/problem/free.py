@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from enum import Enum
 from typing import Any
 
 import numpy as np
@@ -10,10 +12,29 @@ import numpy as np
 from focgen.diagnosis.problem.factors import LEAST, WITHIN
 from focgen.fractional.transfer import TransferFunction
 from focgen.present import present
+from focgen.rig.effects import Effect
 from focgen.rig.rig import Actuator, LinearActuator, Rig
 
 _SLACK = 1e-6  # what stands as close to an end stands there
 _USUAL = 0.2  # relative deviation of nominal parameters from those given that surprises nobody
+_PLACES = 50  # of the input's range where the slope of a drive is looked at
+
+
+class GainFreedom(Enum):
+    """How far a refit may move the gain of the actuator, where that is not known exactly."""
+
+    WITHIN = "within three times its uncertainty"
+    STRAIGHT = "to what is usual about any straighter gain: the curve that was given may be of an effect"
+    ANY = "anywhere"
+
+
+def gain_freedom(families: Sequence[Effect]) -> GainFreedom:
+    """How far the gain may go beside effects. A curve is as steep at zero as before, whatever it does further
+    on, so that the gain makes up for it. Whatever else is static may have been there when the gain's curve
+    was fitted, and be part of it."""
+    if any(family.bends for family in families):
+        return GainFreedom.ANY
+    return GainFreedom.STRAIGHT if any(family.static for family in families) else GainFreedom.WITHIN
 
 
 @dataclass(frozen=True)
@@ -56,9 +77,11 @@ class Free:
             way[: len(self._transfer_of().num)] = 1.0
         return way
 
-    def bounds(self, far: bool = True, bent: bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper bounds of the vector; not ``far``: of an actuator, three times its uncertainty;
-        ``bent``: but for the gain.
+    def bounds(
+        self, far: bool = True, gain: GainFreedom = GainFreedom.WITHIN
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper bounds of the vector; not ``far``: of an actuator, three times its uncertainty, and
+        what ``gain`` says.
 
         A gain that is positive at no load stays so: one that is negative there is no other K(p), but a dead
         zone.
@@ -66,31 +89,30 @@ class Free:
         low, high = self._utmost()
         if not self.has_offset:
             return low, high
-        near = self._usual(bent)
+        near = self._usual(gain)
         kept = np.logical_not(far) | (near[0] == near[1])  # what is known exactly does not move
         return np.where(kept, np.maximum(low, near[0]), low), np.where(kept, np.minimum(high, near[1]), high)
 
-    def beyond(self, vector: np.ndarray, bent: bool = False) -> bool:
+    def beyond(self, vector: np.ndarray, gain: GainFreedom = GainFreedom.WITHIN) -> bool:
         """Whether a number stands at an end of what is usual, or further off."""
         if not self.has_offset:
             return False
-        low, high = self._usual(bent)
+        low, high = self._usual(gain)
         ends = (vector < low + _SLACK) | (vector > high - _SLACK)
         return bool(np.any(ends & (low < high)))
 
-    def _usual(self, bent: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Three times the actuator's uncertainty about what was given; any offset, and ``bent`` any gain that
-        is not known exactly."""
+    def _usual(self, freedom: GainFreedom) -> tuple[np.ndarray, np.ndarray]:
+        """Three times the actuator's uncertainty about what was given; any offset, and any gain or what is
+        straighter than the one given, as ``freedom`` says, where it is not known exactly."""
         known, start, a = self.rig.uncertainty.actuator, self.start(), self.rig.actuator
-        gain, time = (factor_ends(known.gain), factor_ends(known.time))
-        if bent and known.gain:
-            gain = np.array([-np.inf, np.inf])
+        time = factor_ends(known.time)
         moves: list[Any]
         if isinstance(a, Actuator):
-            off = np.inf if bent and known.gain else WITHIN * known.gain * np.abs(start[2:-1]).sum()
             order = WITHIN * known.alpha * start[1]
-            moves = [time, (-order, order), *[(-off, off)] * (len(start) - 3)]
+            moves = [time, (-order, order), *_coefficients(start[2:-1], known.gain, freedom)]
         else:
+            free = freedom is GainFreedom.ANY and known.gain
+            gain = np.array([-np.inf, np.inf]) if free else factor_ends(known.gain)
             linear, orders = present(a), self._orders()
             drive = [(-np.inf, np.inf)] * linear.integrates  # its zero
             moves = [*(gain + k * time for k in orders[0]), *(k * time for k in orders[1]), *drive]
@@ -180,6 +202,24 @@ class Free:
 def _surprise(off: np.ndarray) -> float:
     """Nats against numbers that are so many times off what is usual."""
     return float(np.sum(np.log1p(off**2)))
+
+
+def _coefficients(gains: np.ndarray, known: float, freedom: GainFreedom) -> np.ndarray:
+    """By what the coefficients (k,) of a gain, as parts of what it makes of the largest input, may move
+    (k, 2). A straighter gain has less of all but the first, and for that one a slope of what was given."""
+    if freedom is GainFreedom.ANY and known:
+        return np.tile([-np.inf, np.inf], (len(gains), 1))
+    straight = freedom is GainFreedom.STRAIGHT and known > 0.0 and bool(np.any(gains[1:]))
+    within = WITHIN * (max(known, _USUAL) if straight else known) * np.abs(gains).sum()
+    ends = np.tile([-within, within], (len(gains), 1))
+    if not straight:
+        return ends
+    rising = gains * np.arange(1, len(gains) + 1)
+    slopes = np.polynomial.polynomial.polyval(np.linspace(0.0, 1.0, _PLACES), rising)
+    straighter = np.sort(np.stack([np.zeros(len(gains)), -gains], axis=1), axis=1)
+    straighter[0] = slopes.min() - gains[0], slopes.max() - gains[0]
+    made: np.ndarray = straighter + ends
+    return made
 
 
 def factor_ends(known: float) -> np.ndarray:

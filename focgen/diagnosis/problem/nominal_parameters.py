@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from focgen.diagnosis.problem.factors import Factor, factors
-from focgen.diagnosis.problem.free import Free
+from focgen.diagnosis.problem.free import Free, GainFreedom
 from focgen.present import present
 from focgen.rig.rig import Rig
 
@@ -25,7 +25,7 @@ class NominalParameters:
     """Turns the nominal parameters of a segment's ``stages`` into a vector and back: those of ``freely``, the
     stage that is refitted freely, then a logarithm for each of the others' factors; levels are the segment's
     largest magnitudes. ``wide``: what no effect stands for may go beyond three times its uncertainty,
-    ``far``: so may the actuator's own, ``bent``: its gain; ``held``: nothing moves."""
+    ``far``: so may the actuator's own; ``gain``: how far its gain may; ``held``: nothing moves."""
 
     rig: Rig
     stages: tuple[str, ...]
@@ -34,7 +34,7 @@ class NominalParameters:
     level_out: float
     wide: bool = False
     far: bool = False
-    bent: bool = False
+    gain: GainFreedom = GainFreedom.WITHIN
     held: bool = False
 
     @cached_property
@@ -76,7 +76,7 @@ class NominalParameters:
         """Lower and upper bounds of the vector."""
         if self.held:
             return self.start(), self.start()
-        free = self._free.bounds(self.far, self.bent) if self._free else (np.zeros(0), np.zeros(0))
+        free = self._free.bounds(self.far, self.gain) if self._free else (np.zeros(0), np.zeros(0))
         ends = np.array([f.bounds(self.wide) for f in self.factors]).reshape(-1, 2).T
         return np.r_[free[0], ends[0]], np.r_[free[1], ends[1]]
 
@@ -97,7 +97,7 @@ class NominalParameters:
     def strained(self, vector: np.ndarray) -> bool:
         """Whether the actuator's own are three times their uncertainty off, or more."""
         count = len(self._first)
-        return bool(count) and present(self._free).beyond(vector[:count], self.bent)
+        return bool(count) and present(self._free).beyond(vector[:count], self.gain)
 
     def beyond(self, vector: np.ndarray) -> bool:
         """Whether a factor stands at an end that it could pass if it were ``wide``, or the actuator's own at

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from focgen.diagnosis.problem.excitation import excitation
+from focgen.diagnosis.problem.free import gain_freedom
 from focgen.diagnosis.problem.held import may_have_held, tells_what_is_held
 from focgen.diagnosis.problem.nominal_parameters import NominalParameters
 from focgen.diagnosis.problem.segments import Segment
@@ -136,10 +137,9 @@ class Problem:
         return [c for c in candidates if c not in self.candidates and not c.form.seen]
 
     def with_candidates(self, candidates: Sequence[CandidateEffect]) -> Problem:
-        """The same segment under other effects. A curve is as steep at zero as before, whatever it does
-        further on, so that the gain makes up for it."""
-        bent = any(c.family and c.family.bends for c in candidates)
-        return replace(self, candidates=tuple(candidates), nominals=replace(self.nominals, bent=bent))
+        """The same segment under other effects, and a gain as free as they make it."""
+        gain = gain_freedom([c.family for c in candidates if c.family])
+        return replace(self, candidates=tuple(candidates), nominals=replace(self.nominals, gain=gain))
 
     @property
     def at_every_row(self) -> Problem:

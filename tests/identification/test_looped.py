@@ -1,0 +1,88 @@
+"""A rig that goes round in loops is identified, where T and α alone have no numbers.
+
+The truth is simulated here: a play sample by sample, and a lag on a grid ten times finer than the log's.
+
+Red when a rig with a wide loop is refused ("these logs do not determine T"), or is written with the T of 10⁵
+that lags at every pace alike.
+"""
+
+import numpy as np
+import pytest
+from scipy.signal import cont2discrete, lfilter
+
+from focgen.diagnosis.diagnose import diagnose
+from focgen.errors import FitError
+from focgen.identification.identify import identify
+from focgen.logs.experiment import Experiment
+from focgen.rig.rig import Actuator, Relative, Rig, Signals
+
+FINER, STEP, T, GAIN = 10, 0.2, 1.5, 1.2
+RIG = Rig("r", STEP, Signals("t", "y", "u"), Actuator(1.0, 0.9, (1.0,)))
+
+
+def play(x, width):
+    """Lost motion of half width ``width``, at rest in its middle."""
+    made, now = np.empty_like(x), x[0]
+    for k, value in enumerate(x):
+        now = min(max(now, value - width), value + width)
+        made[k] = now
+    return made
+
+
+def ramps(seed: int, width: float, noise: float = 0.005, count: int = 900) -> Experiment:
+    """Slow ramps between random levels of 0 to 3, through a play and a lag."""
+    rng = np.random.default_rng(seed)
+    corners = np.r_[0.0, rng.uniform(0.0, 3.0, count // 90)]
+    command = np.interp(np.arange(count) / 90, np.arange(len(corners)), corners)
+    drive = GAIN * play(np.repeat(command, FINER), width)
+    num, den, _ = cont2discrete(([1.0], [T, 1.0]), STEP / FINER, "zoh")
+    made = lfilter(np.ravel(num), den, drive)[::FINER]
+    return Experiment(f"s{seed}", STEP, {"command": command, "output": made + rng.normal(0.0, noise, count)})
+
+
+def looped(found):
+    """What is said of a loop."""
+    return [said for said in found.warnings if "beside a play of the command" in said]
+
+
+@pytest.mark.parametrize("seed", range(0, 12, 2))
+def test_a_wide_loop_leaves_the_numbers_what_they_are(seed):
+    """By themselves T was 3.3 times too long, and K up to a tenth off."""
+    found = identify(RIG, [ramps(seed, 0.3), ramps(seed + 1, 0.3)], gain_degree=0, integer=False)
+    actuator = found.rig.actuator
+    assert len(looped(found)) == 1 and "0.3 to either side" in looped(found)[0]
+    assert actuator.T == pytest.approx(T, rel=0.03) and actuator.alpha == pytest.approx(1.0, abs=0.03)
+    assert actuator.gain[0] == pytest.approx(GAIN, rel=0.01)
+    assert not found.rig.effects and found.rig.uncertainty.actuator == Relative(0.2, 0.2, 0.1)
+
+
+@pytest.mark.parametrize(
+    "seed, width, count", [(4, 1.1, 450), (2, 1.1, 450), (2, 0.5, 270)], ids=["no T", "no K", "no order"]
+)
+def test_a_loop_without_which_there_are_no_numbers(seed, width, count):
+    logs = [ramps(s, width, count=count) for s in (seed, seed + 1)]
+    found = identify(RIG, logs, gain_degree=0, integer=False)
+    assert "without it they have no numbers" in looped(found)[0]
+    assert found.rig.actuator.T == pytest.approx(T, rel=0.03)
+    assert found.rig.actuator.alpha == pytest.approx(1.0, abs=0.03)
+
+
+def test_what_is_identified_beside_a_loop_is_diagnosed_as_one():
+    logs = [ramps(20, 0.3), ramps(21, 0.3)]
+    found = diagnose(identify(RIG, logs, gain_degree=0, integer=False).rig, logs, pictures=False)
+    assert len(found.causes) == 1 and "hysteresis" in {c.effect for c in found.causes[0].candidates}
+    assert found.augmented.actuator.T == pytest.approx(T, rel=0.05)
+
+
+def test_without_a_loop_nothing_is_told():
+    found = identify(RIG, [ramps(1, 0.0), ramps(2, 0.0)], gain_degree=0, integer=False)
+    assert not looped(found)
+    assert found.rig.actuator.T == pytest.approx(T, rel=0.1)
+
+
+def test_readings_that_follow_nothing_are_refused_as_before():
+    """A walk of its own: no loop follows it either."""
+    walk = lambda seed: np.cumsum(np.random.default_rng(seed).normal(size=900))
+    logs = [Experiment("a", STEP, {"command": ramps(3, 0.3)["command"], "output": walk(4)})]
+    with pytest.raises(FitError, match="there is no model to write"):
+        identify(RIG, logs, gain_degree=0, integer=False)
