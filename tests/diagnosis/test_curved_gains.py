@@ -72,12 +72,13 @@ def pushing(seed: int) -> Experiment:
         now += (level - now) * (1.0 - np.exp(-STEP / 1.0))
     met = np.where(free > 3.3, 3.3 + 0.35 * (free - 3.3), free)
     read = {"pressure": pressure, "output": met}
-    noisy = {name: values + rng.normal(0.0, 0.006 * np.ptp(values), 960) for name, values in read.items()}
+    noisy = {name: values + rng.normal(0.0, 0.025 * np.ptp(values), 960) for name, values in read.items()}
     return Experiment(f"s{seed}", STEP, noisy)
 
 
-@pytest.mark.parametrize("seed", [0, pytest.param(2, marks=pytest.mark.long)])
+@pytest.mark.parametrize("seed", [2, pytest.param(4, marks=pytest.mark.long)])
 def test_an_obstacle_that_was_there_before(seed):
+    """It was a bent sensor at 0.6, or a bent gain."""
     rig = Rig("r", STEP, Signals("t", "y", pressure="p"), Actuator(1.0, 1.0, (2.0, 0.0)))
     logs = [pushing(seed), pushing(seed + 1), pushing(seed + 10)]
     identified = identify(rig, logs, integer=False).rig
