@@ -21,9 +21,9 @@ _PULSE = 4096  # samples
 def input_noise(records: Sequence[Record]) -> float:
     """Variance of the noise on a measured input, from its second differences; 0 for a command.
 
-    A command is known. An upper bound where the input itself moves within few samples.
+    An upper bound where the input itself moves within few samples.
     """
-    if records[0].hold == "zero":
+    if not records[0].noisy:
         return 0.0
     return float(np.mean([white_level(r.drive) ** 2 for r in records]))
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import expm
@@ -58,7 +58,8 @@ class Record:
 
     ``drive`` is the input from its first value on, and the stage was at rest there. Where ``rests`` it
     is the whole input of a log that begins with its step: the stage was at rest at 0 before. Where ``moves``
-    the stage is not known to have been at rest at the first sample, and its state there is free.
+    the stage is not known to have been at rest at the first sample, and its state there is free. Where it is
+    ``noisy`` the drive was measured; a command is known.
     """
 
     name: str
@@ -67,6 +68,7 @@ class Record:
     hold: str
     rests: bool = False
     moves: bool = False
+    noisy: bool = False
 
     def __len__(self) -> int:
         return len(self.measured)
@@ -80,7 +82,8 @@ class Record:
         drive, measured = (signal[begin : begin + count] for signal in (self.drive, self.measured))
         rests = self.rests and begin == 0
         drive = drive if rests else drive - drive[0]
-        return Record(self.name, drive, measured, self.hold, rests, self.moves or begin > 0)
+        moves = self.moves or begin > 0
+        return replace(self, drive=drive, measured=measured, rests=rests, moves=moves)
 
 
 def parts(records: Sequence[Record], limit: int) -> list[Record]:

@@ -229,6 +229,8 @@ def _refusal(problem: Problem, made: dict[str, tuple[float, float]], step: float
         return "the zero answers in the wrong direction first"
     if zero - half <= 0.0:
         return "the zero's interval reaches 0"
+    if made.get("wn", (0.0, 0.0))[0] * step > np.pi:
+        return "it would ring faster than samples can show"
     if problem.shape.poles > 1 and np.isinf(made["gain"][1]):
         return "its poles cannot be told apart"
     if not made["gain"][1] < abs(made["gain"][0]):

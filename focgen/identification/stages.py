@@ -191,7 +191,8 @@ def _record(experiment: Experiment, stage: str, between: Between) -> Record:
         drive = without_noise(drive, jumps_of(drive))
     rests = stage == "regulator" and np.ptp(drive) == 0.0 and bool(drive[0]) and _answers(measured)
     moves = not (rests or _still(drive, measured))
-    return Record(experiment.name, drive if rests else drive - drive[0], measured, hold, bool(rests), moves)
+    drive = drive if rests else drive - drive[0]
+    return Record(experiment.name, drive, measured, hold, bool(rests), moves, noisy=stage == "sensor")
 
 
 def _still(drive: Array, measured: Array) -> bool:
