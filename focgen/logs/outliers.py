@@ -44,13 +44,11 @@ class _Bounds:
         rows = slice(begin, begin + len(size) + whole - 1)
         barred, never = (_touched(where[rows], whole) for where in (self.barred, self.never))
         far: Bools = size > self.reach
-        if not never.any():
-            return ~barred | far
-        if self.answers is None:
+        if self.answers is None or not barred.any():
             return ~never & (~barred | far)
         near, along = (self.jump * x for x in self.answers.between(rows.start, rows.stop))
         beyond = size > sliding_window_view(near, whole).max(axis=1)
-        found: Bools = _together(along, size, width) | ((~barred | far) & (~never | (far & beyond)))
+        found: Bools = _together(along, size, width) | ((~barred | far | beyond) & (~never | (far & beyond)))
         return found
 
     def least(self, rows: slice) -> float:
@@ -76,9 +74,9 @@ def outliers(
     y: Array, barred: Bools | None = None, never: Bools | None = None, answers: Answers | None = None
 ) -> Bools:
     """Which readings of ``y`` (n,) are outliers, as a mask (n,); where ``barred`` (n,), only those farther
-    off than all that the signal does. Where ``never`` (n,), which is ``barred`` unless given, they are also
-    farther off than ``answers`` say, or leave and come back together with the command; without ``answers``
-    none is.
+    off than all that the signal does, or than ``answers`` say. Where ``never`` (n,), which is ``barred``
+    unless given, they are farther off than both, or leave and come back together with the command; without
+    ``answers`` none is.
 
     One to three readings in a row count that lie on one side of the line through three neighbours on either
     side, farther off than noise could (a Hampel test on that distance, with the noise of the place), than the
@@ -94,7 +92,7 @@ def outliers(
     barred = found.copy() if barred is None else barred
     never = barred if never is None else never
     least, reach = least_noise(y), _reach(y)
-    jump = _jump_beside_sparks(y) if answers is not None and never.any() else np.inf
+    jump = _jump_beside_sparks(y) if answers is not None and barred.any() else np.inf
     bounds = _Bounds(barred, never, answers if jump < np.inf else None, jump, reach)
     for width in range(1, WIDEST + 1):
         for at in _pulses(y, bounds, width, least):

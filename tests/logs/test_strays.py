@@ -5,6 +5,7 @@ Red when one is taken as it stands without a word, or an honest log has such a w
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from focgen.identification.ranges import seen_ranges
 from focgen.logs import Experiment
@@ -90,6 +91,36 @@ def test_open_ranges_are_taken_without_a_loose_plug():
     signals["output"][1100:1104] = 1.0
     after, _ = seen_ranges(Ranges(), [Experiment("a", STEP, signals)])
     assert before.output is not None and after == before
+
+
+@pytest.mark.parametrize("every", [25, 60])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_spark_among_the_steps_of_a_staircase(seed, every):
+    """Three out of four were left: the command had jumped a little before, and the signal goes further in all
+    than the spark, though never at once."""
+    rng = np.random.default_rng([seed, every])
+    command = np.repeat(rng.uniform(0.0, 3.0, COUNT // every + 1), every)[:COUNT]
+    y = lagged(command, rng.uniform(15.0, 60.0)) + 0.01 * rng.normal(size=COUNT)
+    rows = np.sort(rng.choice(np.arange(20, COUNT - 20, 7), 5, replace=False))
+    sparked = y.copy()
+    sparked[rows] += 0.8 * np.ptp(y) * rng.choice([-1.0, 1.0], 5)
+    drive = Drive.by(command)
+    assert not outliers(y, drive.barred, drive.never, drive.answers).any()
+    assert np.array_equal(np.flatnonzero(outliers(sparked, drive.barred, drive.never, drive.answers)), rows)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_what_rings_behind_a_step_is_no_spark(seed):
+    """A mode of 2.5 to 15 readings a period, hardly damped, and a signal that follows at once."""
+    rng = np.random.default_rng(seed)
+    command = np.repeat(rng.uniform(0.0, 3.0, COUNT // 25), 25)
+    rate, damping = 2.0 * np.pi / rng.uniform(2.5, 15.0), rng.uniform(0.02, 0.4)
+    decay, turn = np.exp(-damping * rate), rate * np.sqrt(1.0 - damping**2)
+    poles = np.array([1.0, -2.0 * decay * np.cos(turn), decay**2])
+    noise = 0.005 * rng.normal(size=COUNT)
+    drive = Drive.by(command)
+    for y in (lfilter([0.0, poles.sum()], poles, command), np.r_[0.0, command[:-1]] + lagged(command, 50.0)):
+        assert not outliers(y + noise, drive.barred, drive.never, drive.answers).any()
 
 
 def test_more_outliers_than_are_mended_are_told_of():

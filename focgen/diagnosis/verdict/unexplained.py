@@ -38,8 +38,9 @@ def _is_unknown(e: Explanation, instead: bool = True) -> bool:
         return False
     if not e.causes and rms(e.best.weighed) < e.segment.withheld:
         return False
-    left = disturbed(e)
-    if _is_disturbed(e, left) or (e.segment.closed and _hidden(e, left)):
+    whole = e.whole or e  # what is not named, for the nominal chain or another thing may be it, is explained
+    left = disturbed(whole)
+    if _is_disturbed(whole, left) or (e.segment.closed and _hidden(whole, left)):
         return True
     if (
         instead
