@@ -20,6 +20,7 @@ _LEAST = 0.01  # of a parameter: no rig is known better from one session
 _DIGITS = 3
 _MISFIT = 3.0  # times the noise of the readings: what is left is more than noise
 _LEFT = 0.05  # of the spread: what is left below is of no concern
+_TAKEN_UP = 2.0  # times what a stage's fit leaves: what its numbers have taken up of an effect
 _OUTWEIGHS = 2.0  # times the noise: three quarters of what is left are the model's own misfit
 
 _RECORD = {
@@ -103,8 +104,22 @@ def is_compromise(excitations: Sequence[Excitation], fit: FractionalFit) -> bool
 
 def with_stages(known: Uncertainty, found: dict[str, StageFit]) -> Uncertainty:
     """The uncertainty with regulator and sensor as identified."""
-    stages = {name: Relative(_told(f.gain_relative), _told(f.time_relative)) for name, f in found.items()}
-    return replace(known, **stages)
+    return replace(known, **{name: _stage_uncertainty(name, f) for name, f in found.items()})
+
+
+def _stage_uncertainty(name: str, fit: StageFit) -> Relative:
+    """How well a stage is known. Where its misfit outweighs the noise of the readings, that is no better than
+    a data sheet has it, nor than twice what is left: a fit takes up of an effect whatever its numbers can."""
+    told = Relative(_told(fit.gain_relative), _told(fit.time_relative))
+    shares, ratios = [], []
+    for measured, made in zip(fit.measured, fit.simulated):
+        left = float(np.std(measured - made))
+        shares.append(left / max(float(np.std(measured)), 1e-300))
+        ratios.append(left / max(noise_level(measured), 1e-300))
+    if not np.median(ratios) > _OUTWEIGHS:
+        return told
+    usual, least = getattr(Uncertainty(), name), _told(_TAKEN_UP * float(np.median(shares)))
+    return Relative(max(told.gain, usual.gain, least), max(told.time, usual.time, least))
 
 
 def _told(relative: float) -> float:
