@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.errors import FitError
 from focgen.identification.excitation import Excitation
 from focgen.identification.fractional import FractionalFit
@@ -20,7 +21,7 @@ _LEAST = 0.01  # of a parameter: no rig is known better from one session
 _DIGITS = 3
 _MISFIT = 3.0  # times the noise of the readings: what is left is more than noise
 _LEFT = 0.05  # of the spread: what is left below is of no concern
-_TAKEN_UP = 2.0  # times what a stage's fit leaves: what its numbers have taken up of an effect
+_TAKEN_UP = 2.0  # times what a stage's fit leaves beyond noise: what its numbers have taken up of an effect
 _OUTWEIGHS = 2.0  # times the noise: three quarters of what is left are the model's own misfit
 
 _RECORD = {
@@ -108,18 +109,21 @@ def with_stages(known: Uncertainty, found: dict[str, StageFit]) -> Uncertainty:
 
 
 def _stage_uncertainty(name: str, fit: StageFit) -> Relative:
-    """How well a stage is known. Where its misfit outweighs the noise of the readings, that is no better than
-    a data sheet has it, nor than twice what is left: a fit takes up of an effect whatever its numbers can."""
+    """How well a stage is known: no better than twice what is left beyond the noise of the readings, for a
+    fit takes up of an effect whatever its numbers can; nor than a data sheet has it, where that outweighs the
+    noise."""
     told = Relative(_told(fit.gain_relative), _told(fit.time_relative))
-    shares, ratios = [], []
-    for measured, made in zip(fit.measured, fit.simulated):
-        left = float(np.std(measured - made))
-        shares.append(left / max(float(np.std(measured)), 1e-300))
-        ratios.append(left / max(noise_level(measured), 1e-300))
-    if not np.median(ratios) > _OUTWEIGHS:
-        return told
-    usual, least = getattr(Uncertainty(), name), _told(_TAKEN_UP * float(np.median(shares)))
+    left = [_left_of(measured, made) for measured, made in zip(fit.measured, fit.simulated)]
+    least = _told(_TAKEN_UP * float(np.median([beyond for beyond, _ in left])))
+    usual = getattr(Uncertainty(), name) if np.median([ratio for _, ratio in left]) > _OUTWEIGHS else told
     return Relative(max(told.gain, usual.gain, least), max(told.time, usual.time, least))
+
+
+def _left_of(measured: Array, made: Array) -> tuple[float, float]:
+    """What a fit leaves of a signal (n,) beyond its noise, as a share of its spread, and over its noise."""
+    left, noise = float(np.std(measured - made)), noise_level(measured)
+    beyond = float(np.sqrt(max(left**2 - noise**2, 0.0)))
+    return beyond / max(float(np.std(measured)), 1e-300), left / max(noise, 1e-300)
 
 
 def _told(relative: float) -> float:
