@@ -31,7 +31,7 @@ def warnings_of(
     quality: dict[str, dict[str, float]],
 ) -> tuple[str, ...]:
     """The warnings that apply, most important first. ``failed``: experiments that have no fit of their
-    own."""
+    own; ``quality``: of every model by experiment, nothing where the rig lacks a loop that was fitted."""
     misfit = misfit_of(excitations, fit)
     found = _rig_is_worse(fits, quality) or ([_model_short(misfit, fit)] if misfit else [])
     found += _astray(excitations, fit)
@@ -72,7 +72,7 @@ def _model_short(misfit: float, fit: FractionalFit) -> str:
 
 
 def _rig_is_worse(fits: Sequence[ExperimentFit], quality: dict[str, dict[str, float]]) -> list[str]:
-    own = {f.name: quality["fom"][f.name] - quality["rig"][f.name] for f in fits}
+    own = {f.name: quality["fom"][f.name] - quality["rig"][f.name] for f in fits} if quality else {}
     if not own or float(np.mean(list(own.values()))) <= _WORSE:
         return []
     rig, single = (float(np.mean([quality[m][name] for name in own])) for m in ("rig", "fom"))

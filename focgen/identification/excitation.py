@@ -8,12 +8,12 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from scipy import fft
 
 from focgen.arrays import Array, Bools
 from focgen.errors import FitError, LogError
 from focgen.fractional.simulation import Convolution
 from focgen.fractional.transfer import TransferFunction
+from focgen.identification.driven import Driven
 from focgen.identification.kernel import Kernels
 from focgen.identification.smoothed import without_noise
 from focgen.logs.between import Between, Course, course_of, jumps_of, noise_level
@@ -45,6 +45,7 @@ class Excitation:
     holds pressure^m − before^m, m = 1, 2, …, through the sensor where its output is fitted; ``sensor`` is 1
     where the curvature is. ``rest_shown``: whether the log begins before the first step, so that it shows the
     output's zero.
+    ``jumps`` (n,): where the input jumps, and what it ``runs`` like elsewhere.
     ``reference`` (n,) where a loop was closed, logged or not. ``late``: the nominal dead time of the stages
     that it is seen through, s. ``begins_up``: whether the input was held away from 0 ahead of the first
     sample.
@@ -65,6 +66,8 @@ class Excitation:
     reference: Array | None = None
     late: float = 0.0
     begins_up: bool = False
+    jumps: Bools | None = None
+    runs: Between = Between.SMOOTH
 
     def __len__(self) -> int:
         return len(self.measured)
@@ -127,7 +130,30 @@ class Excitation:
         if count >= len(self):
             return self
         pressure, measured = self.pressure[:count], self.measured[:count]
-        return replace(self, pressure=pressure, measured=measured, course=self.course.until(count))
+        jumps = None if self.jumps is None else self.jumps[:count]
+        return replace(
+            self, pressure=pressure, measured=measured, course=self.course.until(count), jumps=jumps
+        )
+
+    def behind(self, play: float) -> Excitation:
+        """The same behind a play of the input of half width ``play``, units of it, which lies where the way
+        from 0 to the first sample left it."""
+        if not play:
+            return self
+        left = -np.copysign(min(play, abs(self.before)), self.before)
+        never = np.zeros(len(self), np.uint8)
+        moved = kernels.play(self.pressure - self.before, never, play, float(left))
+        return self._driven_by(self.before + moved, self.before)
+
+    def beyond(self, zone: float) -> Excitation:
+        """The same, driven by what is more than ``zone`` of the input, units of it, to either side of 0."""
+        more = [np.sign(p) * np.maximum(np.abs(p) - zone, 0.0) for p in (self.pressure, self.before)]
+        return self._driven_by(more[0], float(more[1]))
+
+    def _driven_by(self, drive: Array, before: float) -> Excitation:
+        jumps = np.zeros(len(self), bool) if self.jumps is None else self.jumps
+        course = _course(drive, before, self.powers, jumps, self.runs, self.sensor, self.step)
+        return replace(self, course=course)
 
     @property
     def sensor_gain(self) -> float:
@@ -135,68 +161,21 @@ class Excitation:
         return self.sensor.dc_gain
 
 
-class Driven:
-    """A course, transformed once, to be convolved with many kernels."""
-
-    def __init__(self, course: Course) -> None:
-        self.course, self.count = course, course.values.shape[1]
-        self.size = fft.next_fast_len(2 * self.count, real=True)
-        self._parts = {  # the kernel of each part, and how many samples ahead of it the part is made
-            "steps": self._transformed(course.jumps, 1),
-            "means": self._transformed(course.straight, 1),
-            "bends": self._transformed(course.bends, 1),
-            "twists": self._transformed(course.twists, 1),
-        }
-
-    def _transformed(self, part: Array | None, first: int) -> Array | None:
-        if part is None or not np.any(part[:, first:]):
-            return None
-        made: Array | None = fft.rfft(part[:, first:], self.size)
-        return made
-
-    def respond(self, kernels: Kernels, rows: int, count: int) -> Array:
-        """The response of each power to each of the first ``rows`` kernels; shape (rows, powers, count)."""
-        n, late = self.count, kernels.late
-        total = np.zeros((rows, len(self.course.values), n))
-        for row in range(rows):  # one at a time: a long log's spectra are large
-            total[row, :, 1:] = self._convolved(kernels, row)
-        if self.course.jumps_at_first:
-            total += kernels.steps[:rows, None, :n] * self.course.jumps[None, :, :1]
-        if late:
-            total = np.concatenate([np.zeros_like(total[:, :, :late]), total[:, :, :-late]], axis=2)
-        return total[:, :, :count]
-
-    def _convolved(self, kernels: Kernels, row: int) -> Array | float:
-        """Each power's response to one row of the kernels, from the second sample on."""
-        spectrum = 0.0
-        for kind, part in self._parts.items():
-            if part is not None:
-                kernel = getattr(kernels, kind)[row, : self.count - 1]
-                spectrum = spectrum + fft.rfft(kernel, self.size) * part
-        return fft.irfft(spectrum, self.size)[:, : self.count - 1] if np.ndim(spectrum) else 0.0
-
-
-def prepare(
-    experiment: Experiment, rig: Rig, powers: int = 1, before: float | None = None, play: float = 0.0
-) -> Excitation:
+def prepare(experiment: Experiment, rig: Rig, powers: int = 1, before: float | None = None) -> Excitation:
     """Make an experiment ready for fitting.
 
     Input is the measured pressure where logged, else the command through the regulator; fitted is the
     curvature where logged, else the output through the sensor. ``before`` is the input's value ahead of the
-    first sample (None: as at the first sample). ``play``: by how much the drive trails its input, units of
-    it. Raises LogError where a signal is constant or too short.
+    first sample (None: as at the first sample). Raises LogError where a signal is constant or too short.
     """
     _check(experiment)
     reference = _varying_reference(experiment)
     pressure, level_before, jumps, between, role = _input(experiment, rig, before, reference is not None)
-    drive = _trailing(pressure, level_before, play) if play else pressure
-    above = np.array([drive**m - level_before**m for m in range(1, powers + 1)])
-    course = course_of(above, jumps, between)
     fitted = "curvature" if "curvature" in experiment else "output"
     sensor = rig.sensor if fitted == "output" else UNITY
     if sensor != UNITY:
         _check_rest(sensor)
-        course = through(sensor, course, experiment.sample_time)
+    course = _course(pressure, level_before, powers, jumps, between, sensor, experiment.sample_time)
     return Excitation(
         experiment.name,
         experiment.sample_time,
@@ -213,13 +192,24 @@ def prepare(
         reference,
         rig.delays.regulator * (role == "command") + rig.delays.sensor * (fitted == "output"),
         abs(level_before) > _AT_REST * float(np.abs(pressure).max()),
+        jumps,
+        between,
     )
 
 
-def _trailing(pressure: Array, before: float, play: float) -> Array:
-    """What a play of half width ``play`` makes of the input (n,), in the middle of its slack ahead of it."""
-    never = np.zeros(len(pressure), np.uint8)
-    return before + kernels.play(pressure - before, never, play)
+def _course(
+    drive: Array,
+    before: float,
+    powers: int,
+    jumps: Bools,
+    between: Between,
+    sensor: TransferFunction,
+    step: float,
+) -> Course:
+    """The course of the powers of a ``drive`` (n,), through the sensor."""
+    above = np.array([drive**m - before**m for m in range(1, powers + 1)])
+    course = course_of(above, jumps, between)
+    return course if sensor == UNITY else through(sensor, course, step)
 
 
 def possible_rests(experiment: Experiment) -> tuple[float | None, ...]:

@@ -40,7 +40,7 @@ def lack_of_form(experiments: Sequence[Excitation], fit: FractionalFit) -> float
     columns = np.hstack(
         [_drawn(drives, steps, response), np.concatenate([*map(_levelled, fit.simulated)])[:, None]]
     )
-    share = _foretold(columns, left)
+    share = foretold(columns, left)
     if share < _SHOWN or not np.ptp(measured) > 0.0:
         return 0.0
     return float(f"{np.sqrt(share * np.mean(left**2)) / np.std(measured):.{_DIGITS}g}")
@@ -62,7 +62,7 @@ def _drawn(drives: Sequence[Array], steps: Sequence[float], response: float) -> 
     return np.concatenate(rows)
 
 
-def _foretold(columns: Array, target: Array) -> float:
+def foretold(columns: Array, target: Array) -> float:
     """What part of the mean square of ``target`` (n,) the ``columns`` (n, k) foretell of stretches that they
     are not fitted to."""
     columns = columns / (np.sqrt(np.mean(columns**2, axis=0)) + 1e-300)

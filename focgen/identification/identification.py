@@ -52,7 +52,9 @@ class Joint:
     ``delay`` in s. ``ci95`` maps T, alpha, delay and gain to 95 % intervals. ``gain_r2`` is that of the line
     through the single fits' K, None with fewer than two of them. ``simulated``, by experiment: its output,
     offset and initial state included. ``pasts``: the experiments that began with an unknown past.
-    ``closed_loop``: whether a loop was closed, so that a noise model was fitted along.
+    ``closed_loop``: whether a loop was closed, so that a noise model was fitted along. ``play``: the half
+    width of the loop that T, alpha and gain stand beside, units of the input, and that is not in
+    ``simulated``; 0 where there is none.
     """
 
     T: float
@@ -64,6 +66,7 @@ class Joint:
     simulated: dict[str, Array] = field(repr=False)
     pasts: Mapping[str, Past] = field(repr=False)
     closed_loop: bool
+    play: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

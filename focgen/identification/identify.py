@@ -154,7 +154,7 @@ def _actuator(
     driven = [e for e in experiments if is_driven(e)]
     used = driven or experiments
     befores = befores_of(used, rig, degree + 1)
-    rig, found, lowered = _fitted(used, befores, rig, degree, delay)
+    rig, found, plain, lowered = _fitted(used, befores, rig, degree, delay)
     excitations, fit = found.excitations, found.fit
     excitations = [x.bare() for x in excitations]  # a long log's spectra are large
     fits, failed = fit_each(excitations, fit.pasts, fit.delay, integer)
@@ -162,16 +162,20 @@ def _actuator(
     loosely = compromise or found.width > 0.0  # a play is no rig's loop to the letter
     known = replace(actuator_uncertainty(excitations, fit, loosely), form=lack_of_form(excitations, fit))
     zero, of_sensor = shared_zero(excitations, fit), excitations[0].fitted_role == "output"
+    actuator = Actuator(joint.T, joint.alpha, joint.gain, 0.0 if of_sensor else zero)
     new = replace(
         rig,
-        actuator=Actuator(joint.T, joint.alpha, joint.gain, 0.0 if of_sensor else zero),
+        actuator=actuator,
         zero=zero if of_sensor else rig.zero,
         delays=replace(rig.delays, actuator=joint.delay),
         uncertainty=replace(rig.uncertainty, actuator=known),
     )
+    if found.width:
+        made = {x.name: answer_from_its_past(x, actuator, joint.delay) for x in plain}
+        joint = replace(joint, play=told_value(found.width, 0.0), simulated=made)
     quality, criterion = _compared(excitations, fits, joint)
     shown = _shown(others, new)
-    warnings = loop_told(found) + warnings_of(excitations, fit, fits, failed, quality)
+    warnings = loop_told(found) + warnings_of(excitations, fit, fits, failed, {} if found.width else quality)
     told = lowered + _told(experiments, excitations) + _zero_told(zero, excitations[0])
     if compromise:
         told += (_COMPROMISE,)
@@ -180,17 +184,20 @@ def _actuator(
 
 def _fitted(
     used: Sequence[Experiment], befores: Sequence[float | None], rig: Rig, degree: int, delay: bool
-) -> tuple[Rig, Fitted, tuple[str, ...]]:
-    """The rig with what its command does between samples, the fit, with all that its intervals allow for, and
-    whether the degree was lowered."""
+) -> tuple[Rig, Fitted, list[Excitation], tuple[str, ...]]:
+    """The rig with what its command does between samples, the fit, with all that its intervals allow for, the
+    experiments without the loop that it may be beside, and whether the degree was lowered."""
     runs, apart = as_it_runs(used, befores, rig, degree, delay)
-    _, lowered = ready_for(used, befores, runs, degree)
-    found = fitted(lambda play: ready_for(used, befores, runs, degree, play)[0], delay)
+    plain, lowered = ready_for(used, befores, runs, degree)
+    found = fitted(plain, delay)
     if found.width:  # what a command does shows beside the loop alone
-        runs, apart = as_it_runs(used, befores, rig, degree, delay, found.width)
-        found = again(found, ready_for(used, befores, runs, degree, found.width)[0], delay)
+        other, beside = as_it_runs(used, befores, rig, degree, delay, found.width)
+        behind = [x.behind(found.width) for x in ready_for(used, befores, other, degree)[0]]
+        runs, apart, found = (
+            (other, beside, new) if (new := again(found, behind, delay)) else (runs, {}, found)
+        )
     half = {name: found.fit.half[name] + by for name, by in apart.items()}
-    return runs, replace(found, fit=replace(found.fit, half=found.fit.half | half)), lowered
+    return runs, replace(found, fit=replace(found.fit, half=found.fit.half | half)), plain, lowered
 
 
 def _told(experiments: Sequence[Experiment], excitations: list[Excitation]) -> tuple[str, ...]:

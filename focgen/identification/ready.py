@@ -15,6 +15,7 @@ from focgen.identification.excitation import Excitation, possible_rests, prepare
 from focgen.identification.fractional import FractionalFit, fit_fractional
 from focgen.identification.gain import feasible_degree
 from focgen.identification.past import worth_it
+from focgen.identification.sure import has_numbers
 from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
 from focgen.rig.engine import between_of
@@ -50,15 +51,11 @@ def _fitted(excitations: list[Excitation]) -> FractionalFit:
 
 
 def ready_for(
-    experiments: Sequence[Experiment],
-    befores: Sequence[float | None],
-    rig: Rig,
-    degree: int,
-    play: float = 0.0,
+    experiments: Sequence[Experiment], befores: Sequence[float | None], rig: Rig, degree: int
 ) -> tuple[list[Excitation], tuple[str, ...]]:
     """The experiments, with what the input was before each, made ready for a K(p) of the ``degree``, or of
-    one that they show, which it says; ``play``: by how much the drive trails its input."""
-    ready = [prepare(e, rig, degree + 1, before, play) for e, before in zip(experiments, befores)]
+    one that they show, which it says."""
+    ready = [prepare(e, rig, degree + 1, before) for e, before in zip(experiments, befores)]
     possible, lowered = feasible_degree(ready, degree)
     return [x.with_powers(possible + 1) for x in ready], lowered
 
@@ -73,10 +70,11 @@ def as_it_runs(
 ) -> tuple[Rig, dict[str, Any]]:
     """The rig with what its command does between samples, where that drives the fit, and by how much each of
     the numbers found is another where it may do something else. Pasts are left to the fit itself: they take
-    longest. ``play``: by how much the drive trails its input."""
+    longest. ``play``: the half width of a loop that all this is behind, units of the input."""
 
     def tried(way: Between) -> Tried[FractionalFit]:
-        ready, _ = ready_for(experiments, befores, replace(rig, between=way), degree, play)
+        plain, _ = ready_for(experiments, befores, replace(rig, between=way), degree)
+        ready = [x.behind(play) for x in plain]
         fit = fit_fractional(ready, delay, pasts=[None] * len(ready))
         left = np.concatenate([(x.measured - y) / x.spread for x, y in zip(ready, fit.simulated)])
         return Tried(way, fit, left)
@@ -89,7 +87,7 @@ def as_it_runs(
         way = likeliest_way(ways, tried, at_rest(commands))
     except FitError:  # without numbers nothing tells the ways apart: the fit itself says so, or finds a loop
         return rig, {}
-    if way.rival is None:
+    if way.rival is None or not has_numbers(way.rival):
         return running(rig, way.known), {}
     names = ("T", "alpha", "delay", "gain")[: 4 if len(way.fit.gain) == len(way.rival.gain) else 3]
     return rig, {n: np.abs(getattr(way.fit, n) - getattr(way.rival, n)) for n in names}

@@ -15,7 +15,7 @@ from focgen.identification.identification import ExperimentFit
 from focgen.identification.integer import IntegerFit, fit_integer_models
 from focgen.identification.past import Past
 from focgen.identification.quality import gof
-from focgen.identification.sure import HARDLY
+from focgen.identification.sure import has_numbers
 from focgen.logs.between import noise_level
 from focgen.pools import pool
 from focgen.progress import track
@@ -47,7 +47,7 @@ def fit_each(
             fit = fit_fractional([x], delay, [past])
         except FitError:
             fit = None
-        found = fit if fit is not None and _has_numbers(fit) else None
+        found = fit if fit is not None and has_numbers(fit) else None
         fits.append(found)
         if found is None:
             failed.append(x.name)
@@ -58,13 +58,6 @@ def fit_each(
     done = [(x, fit) for x, fit in zip(singles, fits) if fit is not None]
     models = _integer_models(done) if integer else [()] * len(done)
     return [_experiment_fit(x, fit, more) for (x, fit), more in zip(done, models)], failed
-
-
-def _has_numbers(fit: FractionalFit) -> bool:
-    """Whether the log bounds K, T and α at all. A search may also end far out, where only K/T is seen, with
-    an interval without a bound."""
-    found = (("gain", fit.gain), ("T", fit.T), ("alpha", fit.alpha))
-    return all(np.all(fit.half[name] <= HARDLY * np.abs(np.asarray(value))) for name, value in found)
 
 
 def is_step(x: Excitation) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 from focgen.arrays import Array
 from focgen.errors import FitError
 from focgen.identification.excitation import Excitation
+from focgen.identification.form import foretold
 from focgen.identification.fractional import FractionalFit
 from focgen.identification.stages import StageFit
 from focgen.logs.between import noise_level
@@ -21,7 +22,7 @@ _LEAST = 0.01  # of a parameter: no rig is known better from one session
 _DIGITS = 3
 _MISFIT = 3.0  # times the noise of the readings: what is left is more than noise
 _LEFT = 0.05  # of the spread: what is left below is of no concern
-_TAKEN_UP = 2.0  # times what a stage's fit leaves beyond noise: what its numbers have taken up of an effect
+_TAKEN_UP = 2.0  # times what a stage's drive foretells of the rest: what its numbers took up of an effect
 _OUTWEIGHS = 2.0  # times the noise: three quarters of what is left are the model's own misfit
 
 _RECORD = {
@@ -45,6 +46,13 @@ def check_determined(excitations: Sequence[Excitation], fit: FractionalFit) -> N
         else:
             remedy += _RECORD[worst[0]]
         raise FitError(names, f"{what}: there is no model to write", remedy)
+
+
+def has_numbers(fit: FractionalFit) -> bool:
+    """Whether the log bounds K, T and α at all. A search may also end far out, where only K/T is seen, with
+    an interval without a bound."""
+    found = (("gain", fit.gain), ("T", fit.T), ("alpha", fit.alpha))
+    return all(np.all(fit.half[name] <= HARDLY * np.abs(np.asarray(value))) for name, value in found)
 
 
 def misfit_of(excitations: Sequence[Excitation], fit: FractionalFit) -> float | None:
@@ -105,25 +113,30 @@ def is_compromise(excitations: Sequence[Excitation], fit: FractionalFit) -> bool
 
 def with_stages(known: Uncertainty, found: dict[str, StageFit]) -> Uncertainty:
     """The uncertainty with regulator and sensor as identified."""
-    return replace(known, **{name: _stage_uncertainty(name, f) for name, f in found.items()})
+    return replace(known, **{name: _stage_uncertainty(f) for name, f in found.items()})
 
 
-def _stage_uncertainty(name: str, fit: StageFit) -> Relative:
-    """How well a stage is known: no better than twice what is left beyond the noise of the readings, for a
-    fit takes up of an effect whatever its numbers can; nor than a data sheet has it, where that outweighs the
-    noise."""
-    told = Relative(_told(fit.gain_relative), _told(fit.time_relative))
-    left = [_left_of(measured, made) for measured, made in zip(fit.measured, fit.simulated)]
-    least = _told(_TAKEN_UP * float(np.median([beyond for beyond, _ in left])))
-    usual = getattr(Uncertainty(), name) if np.median([ratio for _, ratio in left]) > _OUTWEIGHS else told
-    return Relative(max(told.gain, usual.gain, least), max(told.time, usual.time, least))
+def _stage_uncertainty(fit: StageFit) -> Relative:
+    """How well a stage is known: no better than twice what its drive foretells of what is left, for a fit
+    takes up of an effect whatever its numbers can. Noise of a colour, or steps of a converter, are not
+    foretold."""
+    left = [_foretold_of(measured, made) for measured, made in zip(fit.measured, fit.simulated)]
+    least = _told(_TAKEN_UP * float(np.median(left)))
+    return Relative(max(_told(fit.gain_relative), least), max(_told(fit.time_relative), least))
 
 
-def _left_of(measured: Array, made: Array) -> tuple[float, float]:
-    """What a fit leaves of a signal (n,) beyond its noise, as a share of its spread, and over its noise."""
-    left, noise = float(np.std(measured - made)), noise_level(measured)
-    beyond = float(np.sqrt(max(left**2 - noise**2, 0.0)))
-    return beyond / max(float(np.std(measured)), 1e-300), left / max(noise, 1e-300)
+def _foretold_of(measured: Array, made: Array) -> float:
+    """The root mean square that a curve of what a fit has ``made`` (n,), and one of each way that it goes,
+    foretell of what that leaves, as a share of the signal's spread."""
+    spread = float(np.std(measured))
+    if not spread > 0.0 or not np.ptp(made) > 0.0:
+        return 0.0
+    place, way = made / float(np.max(np.abs(made))), np.gradient(made)
+    columns = [place, place**2, place**3, np.maximum(way, 0.0), np.minimum(way, 0.0), np.sign(way)]
+    levelled = np.stack([c - np.mean(c) for c in columns], axis=1)
+    left = measured - made
+    share = foretold(levelled, left - np.mean(left))
+    return float(np.sqrt(share) * np.std(left)) / spread
 
 
 def _told(relative: float) -> float:

@@ -18,6 +18,7 @@ _BLOCK = 128  # readings over which the noise is taken as even
 _RARE = 0.01  # of the readings: more of them are the signal's own
 _FEWEST = 20  # readings
 _BEHIND = WIDEST + 2 * SIDE  # readings of which the command has to rest where there is one side only
+_ALIKE = 3  # readings as many rows behind jumps of the command: they answer it
 _PART = 1 << 16  # windows that are looked at side by side
 _FINE = 1e-3  # of the span: what noise there is at least
 _FAR_OFF = 0.2  # of the span: so far off both sides is a number that stands for no reading …
@@ -99,7 +100,22 @@ def outliers(
             found[at : at + width] = True
     for way, ends in _at_ends(y, bounds, known, least):
         found[way][:ROWS] |= ends
-    return found
+    return found if answers is None else found & ~_alike(found, answers)
+
+
+def _alike(found: Bools, answers: Answers) -> Bools:
+    """Which of the readings ``found`` (n,) come as many rows behind a jump of the command as others do: they
+    answer it, as a valve's knock does. Sparks do not wait for it."""
+    jumps = np.flatnonzero(np.abs(np.diff(answers.command)) > answers.jump) + 1
+    rows = np.flatnonzero(found)
+    if not len(jumps) or len(rows) < _ALIKE:
+        return np.zeros(len(found), bool)
+    behind = rows - jumps[np.maximum(np.searchsorted(jumps, rows, side="right") - 1, 0)]
+    near = (behind >= 0) & (behind <= _BEHIND)
+    often = np.bincount(behind[near], minlength=_BEHIND + 1) >= _ALIKE
+    made = np.zeros(len(found), bool)
+    made[rows[near][often[behind[near]]]] = True
+    return made
 
 
 def are_many(found: Bools) -> bool:

@@ -34,7 +34,7 @@ def identification_payload(found: Identification) -> dict[str, Any]:
 def _joint(joint: Joint | None) -> dict[str, Any] | None:
     if joint is None:
         return None
-    keys = ("T", "alpha", "delay", "gain_r2", "ci95", "closed_loop")
+    keys = ("T", "alpha", "delay", "gain_r2", "ci95", "closed_loop", "play")
     begun = {name: past.steps for name, past in joint.pasts.items()}
     return {key: getattr(joint, key) for key in keys} | {"gain": list(joint.gain), "initial_steps": begun}
 

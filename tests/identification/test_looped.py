@@ -14,6 +14,7 @@ from focgen.diagnosis.diagnose import diagnose
 from focgen.errors import FitError
 from focgen.identification.identify import identify
 from focgen.logs.experiment import Experiment
+from focgen.rig.replay import replay
 from focgen.rig.rig import Actuator, Relative, Rig, Signals
 
 FINER, STEP, T, GAIN = 10, 0.2, 1.5, 1.2
@@ -54,10 +55,15 @@ def test_a_wide_loop_leaves_the_numbers_what_they_are(seed):
     assert actuator.T == pytest.approx(T, rel=0.03) and actuator.alpha == pytest.approx(1.0, abs=0.03)
     assert actuator.gain[0] == pytest.approx(GAIN, rel=0.01)
     assert not found.rig.effects and found.rig.uncertainty.actuator == Relative(0.2, 0.2, 0.1)
+    assert found.joint.play == pytest.approx(0.3, rel=0.01)
+    name = f"s{seed}"
+    assert found.gof["rig"][name] < 0.9 < found.gof["fom"][name]
+    written = replay(found.rig, [ramps(seed, 0.3)]).logs[name]
+    assert found.gof["rig"][name] == pytest.approx(written.gof, abs=0.1)  # but for an offset of its own
 
 
 @pytest.mark.parametrize(
-    "seed, width, count", [(4, 1.1, 450), (2, 1.1, 450), (2, 0.5, 270)], ids=["no T", "no K", "no order"]
+    "seed, width, count", [(4, 1.1, 450), (2, 1.1, 450), (0, 0.8, 270)], ids=["no T", "no K", "short"]
 )
 def test_a_loop_without_which_there_are_no_numbers(seed, width, count):
     logs = [ramps(s, width, count=count) for s in (seed, seed + 1)]
@@ -65,6 +71,37 @@ def test_a_loop_without_which_there_are_no_numbers(seed, width, count):
     assert "without it they have no numbers" in looped(found)[0]
     assert found.rig.actuator.T == pytest.approx(T, rel=0.03)
     assert found.rig.actuator.alpha == pytest.approx(1.0, abs=0.03)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("zone", [0.4, 0.8])
+def test_a_few_readings_of_a_dead_zone_are_no_loop(seed, zone):
+    """They were: 40 of them, with T = 0.33 of 1.5 said to be known to a fifth."""
+    rng = np.random.default_rng(seed)
+    command = np.interp(np.arange(40) / 10, np.arange(5), np.r_[0.0, rng.uniform(0.0, 3.0, 4)])
+    drive = np.maximum(np.repeat(command, FINER) - zone, 0.0)
+    num, den, _ = cont2discrete(([1.0], [T, 1.0]), STEP / FINER, "zoh")
+    output = lfilter(np.ravel(num), den, drive)[::FINER] + 0.005 * rng.normal(size=40)
+    try:
+        found = identify(RIG, [Experiment("a", STEP, {"command": command, "output": output})], gain_degree=0)
+    except FitError:
+        return
+    assert not looped(found)
+
+
+def test_a_loop_is_where_the_way_to_the_first_sample_left_it():
+    """Ramps about 5 of which the first 26 s are missing; from the middle of its slack T was 0.6 to 2.4."""
+    whole = ramps(3, 0.3)
+    raised = {"command": whole["command"] + 2.0, "output": whole["output"] + 2.0 * GAIN}
+    logs = [Experiment("cut", STEP, {name: values[130:] for name, values in raised.items()})]
+    found = identify(RIG, logs, gain_degree=0, integer=False)
+    assert looped(found) and found.rig.actuator.T == pytest.approx(T, rel=0.1)
+
+
+def test_what_only_rises_may_be_behind_a_dead_zone_as_well():
+    logs = [ramps(s, 0.5, count=270) for s in (2, 3)]
+    with pytest.raises(FitError, match="the best order is at the edge"):
+        identify(RIG, logs, gain_degree=0, integer=False)
 
 
 def test_what_is_identified_beside_a_loop_is_diagnosed_as_one():
@@ -76,7 +113,7 @@ def test_what_is_identified_beside_a_loop_is_diagnosed_as_one():
 
 def test_without_a_loop_nothing_is_told():
     found = identify(RIG, [ramps(1, 0.0), ramps(2, 0.0)], gain_degree=0, integer=False)
-    assert not looped(found)
+    assert not looped(found) and found.joint.play == 0.0
     assert found.rig.actuator.T == pytest.approx(T, rel=0.1)
 
 

@@ -109,6 +109,20 @@ def test_a_spark_among_the_steps_of_a_staircase(seed, every):
     assert np.array_equal(np.flatnonzero(outliers(sparked, drive.barred, drive.never, drive.answers)), rows)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_what_knocks_behind_steps_is_no_spark(seed):
+    """A pipe knocks two rows behind each closing of its valve, once. Sparks do not wait for the command. What
+    it does by less than a jump is not asked."""
+    rng = np.random.default_rng(seed)
+    command = np.repeat(rng.uniform(0.0, 3.0, COUNT // 60), 60)
+    change = np.diff(command, prepend=0.0)
+    y = lagged(command, 20.0) + 0.01 * rng.normal(size=COUNT)
+    knocks = np.roll(np.where((change < 0.0) & (np.arange(COUNT) > 0), -1.5 * change, 0.0), 2)
+    drive = Drive.by(command)
+    found = outliers(y + knocks, drive.barred, drive.never, drive.answers)
+    assert not np.any(found & (knocks > 1.5 * drive.answers.jump)) and np.sum(knocks > 0.5) > 5
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_what_rings_behind_a_step_is_no_spark(seed):
     """A mode of 2.5 to 15 readings a period, hardly damped, and a signal that follows at once."""
