@@ -143,7 +143,7 @@ class Excitation:
         left = -np.copysign(min(play, abs(self.before)), self.before)
         never = np.zeros(len(self), np.uint8)
         moved = kernels.play(self.pressure - self.before, never, play, float(left))
-        return self._driven_by(self.before + moved, self.before)
+        return self._driven_by(self.before + moved, self.before + float(left))
 
     def beyond(self, zone: float) -> Excitation:
         """The same, driven by what is more than ``zone`` of the input, units of it, to either side of 0."""

@@ -19,12 +19,13 @@ from focgen.identification.form import lack_of_form
 from focgen.identification.fractional import FractionalFit
 from focgen.identification.gain import check_degree, r2_of_line
 from focgen.identification.identification import ExperimentFit, Identification, Joint, Unseen
+from focgen.identification.joint_fit import joint_fit
 from focgen.identification.known_actuator import answer_from_its_past
 from focgen.identification.lacking import check_alike
-from focgen.identification.looped import Fitted, again, fitted, loop_told
+from focgen.identification.looped import loop_told
 from focgen.identification.quality import bic, effective_samples, gof
 from focgen.identification.ranges import seen_ranges
-from focgen.identification.ready import as_it_runs, befores_of, ready_for, running
+from focgen.identification.ready import befores_of, running
 from focgen.identification.remarks import remarks_of
 from focgen.identification.single import fit_each, is_step
 from focgen.identification.stages import StageFit, identify_stage
@@ -153,8 +154,8 @@ def _actuator(
     check_alike(experiments, rig)
     driven = [e for e in experiments if is_driven(e)]
     used = driven or experiments
-    befores = befores_of(used, rig, degree + 1)
-    rig, found, plain, lowered = _fitted(used, befores, rig, degree, delay)
+    joined = joint_fit(used, rig, degree, delay)
+    rig, found = joined.rig, joined.found
     excitations, fit = found.excitations, found.fit
     excitations = [x.bare() for x in excitations]  # a long log's spectra are large
     fits, failed = fit_each(excitations, fit.pasts, fit.delay, integer)
@@ -171,33 +172,15 @@ def _actuator(
         uncertainty=replace(rig.uncertainty, actuator=known),
     )
     if found.width:
-        made = {x.name: answer_from_its_past(x, actuator, joint.delay) for x in plain}
+        made = {x.name: answer_from_its_past(x, actuator, joint.delay) for x in joined.plain}
         joint = replace(joint, play=told_value(found.width, 0.0), simulated=made)
     quality, criterion = _compared(excitations, fits, joint)
     shown = _shown(others, new)
     warnings = loop_told(found) + warnings_of(excitations, fit, fits, failed, {} if found.width else quality)
-    told = lowered + _told(experiments, excitations) + _zero_told(zero, excitations[0])
+    told = joined.lowered + _told(experiments, excitations) + _zero_told(zero, excitations[0])
     if compromise:
         told += (_COMPROMISE,)
     return Identification(tuple(fits), joint, new, quality, criterion, warnings, told, shown)
-
-
-def _fitted(
-    used: Sequence[Experiment], befores: Sequence[float | None], rig: Rig, degree: int, delay: bool
-) -> tuple[Rig, Fitted, list[Excitation], tuple[str, ...]]:
-    """The rig with what its command does between samples, the fit, with all that its intervals allow for, the
-    experiments without the loop that it may be beside, and whether the degree was lowered."""
-    runs, apart = as_it_runs(used, befores, rig, degree, delay)
-    plain, lowered = ready_for(used, befores, runs, degree)
-    found = fitted(plain, delay)
-    if found.width:  # what a command does shows beside the loop alone
-        other, beside = as_it_runs(used, befores, rig, degree, delay, found.width)
-        behind = [x.behind(found.width) for x in ready_for(used, befores, other, degree)[0]]
-        runs, apart, found = (
-            (other, beside, new) if (new := again(found, behind, delay)) else (runs, {}, found)
-        )
-    half = {name: found.fit.half[name] + by for name, by in apart.items()}
-    return runs, replace(found, fit=replace(found.fit, half=found.fit.half | half)), plain, lowered
 
 
 def _told(experiments: Sequence[Experiment], excitations: list[Excitation]) -> tuple[str, ...]:

@@ -26,7 +26,7 @@ _HOPELESS = 1e3  # what is left where there is no fit, as a share of the signals
 _MOST = 0.25  # of the mean square that a model with numbers leaves: beside a loop that is most of it,
 _HALVED = 0.5  # and of what one without numbers leaves,
 _FOLLOWS = 0.05  # and of the fitted signals': what is left beside it, at most
-_ZONE = 0.5  # and of what is left behind a dead zone instead, where a model has no numbers without
+_ZONE = 0.5  # and of what is left behind a dead zone instead
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ def fitted(excitations: list[Excitation], delay: bool) -> Fitted:
     except FitError:
         enough = _FOLLOWS if alone is None else min(_FOLLOWS, _HALVED * alone.left)
         beside = _beside_a_loop(excitations, delay, enough)
-        if beside is None or beside.left > _ZONE * _behind_a_zone(excitations, delay):
+        if beside is None:
             raise
         return beside
     if misfit_of(excitations, alone.fit) is None:
@@ -95,8 +95,8 @@ def loop_told(found: Fitted) -> tuple[str, ...]:
 
 
 def _beside_a_loop(excitations: Sequence[Excitation], delay: bool, enough: float) -> Fitted | None:
-    """The fit beside the loop that leaves least; None where that is more than ``enough``, or it has no
-    numbers."""
+    """The fit beside the loop that leaves least; None where that is more than ``enough``, it has no numbers,
+    or a dead zone will do nearly as well."""
     width, _ = _closest(excitations, delay, Excitation.behind, enough)
     if width is None:
         return None
@@ -106,7 +106,8 @@ def _beside_a_loop(excitations: Sequence[Excitation], delay: bool, enough: float
         check_determined(behind, found.fit)
     except FitError:
         return None
-    return found if found.left <= enough else None
+    surely = found.left <= enough and found.left <= _ZONE * _behind_a_zone(excitations, delay)
+    return found if surely else None
 
 
 def _behind_a_zone(excitations: Sequence[Excitation], delay: bool) -> float:

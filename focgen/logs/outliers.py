@@ -18,7 +18,8 @@ _BLOCK = 128  # readings over which the noise is taken as even
 _RARE = 0.01  # of the readings: more of them are the signal's own
 _FEWEST = 20  # readings
 _BEHIND = WIDEST + 2 * SIDE  # readings of which the command has to rest where there is one side only
-_ALIKE = 3  # readings as many rows behind jumps of the command: they answer it
+_ALIKE = 3  # readings as many rows behind jumps of the command, at least: they answer it …
+_BY_CHANCE = 4.0  # … and more than come there by chance, by so many of its standard deviations
 _PART = 1 << 16  # windows that are looked at side by side
 _FINE = 1e-3  # of the span: what noise there is at least
 _FAR_OFF = 0.2  # of the span: so far off both sides is a number that stands for no reading …
@@ -112,7 +113,10 @@ def _alike(found: Bools, answers: Answers) -> Bools:
         return np.zeros(len(found), bool)
     behind = rows - jumps[np.maximum(np.searchsorted(jumps, rows, side="right") - 1, 0)]
     near = (behind >= 0) & (behind <= _BEHIND)
-    often = np.bincount(behind[near], minlength=_BEHIND + 1) >= _ALIKE
+    chance = len(rows) * len(jumps) / len(found)  # that so many of them come behind jumps by as much
+    often = np.bincount(behind[near], minlength=_BEHIND + 1) >= max(
+        _ALIKE, chance + _BY_CHANCE * np.sqrt(chance)
+    )
     made = np.zeros(len(found), bool)
     made[rows[near][often[behind[near]]]] = True
     return made

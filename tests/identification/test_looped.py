@@ -30,15 +30,34 @@ def play(x, width):
     return made
 
 
-def ramps(seed: int, width: float, noise: float = 0.005, count: int = 900) -> Experiment:
-    """Slow ramps between random levels of 0 to 3, through a play and a lag."""
-    rng = np.random.default_rng(seed)
-    corners = np.r_[0.0, rng.uniform(0.0, 3.0, count // 90)]
-    command = np.interp(np.arange(count) / 90, np.arange(len(corners)), corners)
+def answer(command, width: float):
+    """What a play and a lag make of a command in straight lines."""
     drive = GAIN * play(np.repeat(command, FINER), width)
     num, den, _ = cont2discrete(([1.0], [T, 1.0]), STEP / FINER, "zoh")
-    made = lfilter(np.ravel(num), den, drive)[::FINER]
-    return Experiment(f"s{seed}", STEP, {"command": command, "output": made + rng.normal(0.0, noise, count)})
+    return lfilter(np.ravel(num), den, drive)[::FINER]
+
+
+def levels(rng, count: int):
+    """Slow ramps between random levels of 0 to 3."""
+    corners = np.r_[0.0, rng.uniform(0.0, 3.0, count // 90)]
+    return np.interp(np.arange(count) / 90, np.arange(len(corners)), corners)
+
+
+def ramps(seed: int, width: float, noise: float = 0.005, count: int = 900) -> Experiment:
+    """Slow ramps through a play and a lag."""
+    rng = np.random.default_rng(seed)
+    command = levels(rng, count)
+    made = answer(command, width) + rng.normal(0.0, noise, count)
+    return Experiment(f"s{seed}", STEP, {"command": command, "output": made})
+
+
+def raised(seed: int) -> Experiment:
+    """The same on top of 2, where the rig has come to rest before the log begins."""
+    rng = np.random.default_rng(seed)
+    ahead = np.r_[np.linspace(0.0, 2.0, 60), np.full(140, 2.0)]
+    command = np.r_[ahead, 2.0 + levels(rng, 900)]
+    signals = {"command": command, "output": answer(command, 0.3) + rng.normal(0.0, 0.005, len(command))}
+    return Experiment(f"r{seed}", STEP, {name: values[200:] for name, values in signals.items()})
 
 
 def looped(found):
@@ -87,6 +106,15 @@ def test_a_few_readings_of_a_dead_zone_are_no_loop(seed, zone):
     except FitError:
         return
     assert not looped(found)
+
+
+@pytest.mark.parametrize("seed, degree", [(4, 0), (2, 1), pytest.param(5, 0, marks=pytest.mark.long)])
+def test_what_was_before_is_found_beside_the_loop(seed, degree):
+    """Without it the logs were taken to begin with a step from 0: T = 0.3 to 1.3, alpha = 0.66 to 0.9."""
+    found = identify(RIG, [raised(seed), raised(seed + 1)], gain_degree=degree, integer=False)
+    assert found.joint.play == pytest.approx(0.3, rel=0.01) and found.joint.T == pytest.approx(T, rel=0.03)
+    assert found.joint.gain[0] == pytest.approx(GAIN, rel=0.02)
+    assert not any("begin with their step" in note for note in found.notes)
 
 
 def test_a_loop_is_where_the_way_to_the_first_sample_left_it():

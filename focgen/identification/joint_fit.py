@@ -1,0 +1,83 @@
+"""The fit to all experiments at once: beside what the input was before them, what the command does between
+their samples, and the loop that a rig may go round in. Each of these shows only beside the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from focgen.errors import FitError
+from focgen.identification.excitation import Excitation, possible_rests
+from focgen.identification.looped import Fitted, again, fitted
+from focgen.identification.ready import as_it_runs, befores_of, ready_for
+from focgen.identification.sure import misfit_of
+from focgen.logs.experiment import Experiment
+from focgen.rig.rig import Rig
+
+Befores = list[float | None]
+
+
+@dataclass(frozen=True, eq=False)
+class JointFit:
+    """``rig``: with what its command does between samples; ``found``: the fit, with all that its intervals
+    allow for; ``plain``: the experiments without the loop that it may be beside; ``lowered``: what is said
+    where the degree of K(p) was lowered."""
+
+    rig: Rig
+    found: Fitted
+    plain: list[Excitation]
+    lowered: tuple[str, ...]
+
+
+def joint_fit(used: Sequence[Experiment], rig: Rig, degree: int, delay: bool) -> JointFit:
+    """The fit to the experiments ``used``. What the input was before them is found without a loop, and again
+    with one where the model lacks something.
+
+    Raises FitError where the logs do not determine the parameters.
+    """
+    befores = befores_of(used, rig, degree + 1)
+    made, reason = None, None
+    try:
+        made = _fit(used, befores, rig, degree, delay)
+        if not (made.found.width or misfit_of(made.plain, made.found.fit)):
+            return made
+    except FitError as short:
+        reason = short
+    for other in _others(used, befores):
+        made = _closer(made, used, other, rig, degree, delay)
+    if made is None:
+        raise reason or FitError("fit", "has no result", "look at the logs")
+    return made
+
+
+def _others(used: Sequence[Experiment], befores: Befores) -> list[Befores]:
+    """What the input may have been before the experiments instead: what each begins with, or 0."""
+    ways = [possible_rests(e) for e in used]
+    return [other for k in (0, -1) if (other := [way[k] for way in ways]) != befores]
+
+
+def _closer(
+    made: JointFit | None, used: Sequence[Experiment], befores: Befores, rig: Rig, degree: int, delay: bool
+) -> JointFit | None:
+    """``made``, or the fit with these ``befores`` where that is beside a loop and leaves less."""
+    try:
+        other = _fit(used, befores, rig, degree, delay)
+    except FitError:
+        return made
+    closer = made is None or not made.found.width or other.found.left < made.found.left
+    return other if other.found.width and closer else made
+
+
+def _fit(used: Sequence[Experiment], befores: Befores, rig: Rig, degree: int, delay: bool) -> JointFit:
+    runs, apart = as_it_runs(used, befores, rig, degree, delay)
+    plain, lowered = ready_for(used, befores, runs, degree)
+    found = fitted(plain, delay)
+    if found.width:  # what a command does shows beside the loop alone
+        apart = {}
+        other, beside = as_it_runs(used, befores, rig, degree, delay, found.width)
+        ready, _ = ready_for(used, befores, other, degree)
+        if new := again(found, [x.behind(found.width) for x in ready], delay):
+            runs, apart, plain, found = other, beside, ready, new
+    half = {name: found.fit.half[name] + by for name, by in apart.items()}
+    return JointFit(runs, replace(found, fit=replace(found.fit, half=found.fit.half | half)), plain, lowered)
