@@ -33,6 +33,8 @@ from focgen.rig.rig import Actuator, Rig, Signals
 from focgen.trials.severity import VISIBLE
 
 _COUNT, H = 10_000, 0.05
+QUIET = dict.fromkeys(("bursts", "low_frequency", "tonal", "pushed"), False)
+SLOW = QUIET | {"low_frequency": True}
 
 
 class _Fit(SimpleNamespace):
@@ -384,6 +386,31 @@ def test_beside_an_effect_what_is_likelier_the_nominal_chain_is_not_named(monkey
     even = SimpleNamespace(rivals=[replace(_rival("softening", 300.0, 1.4), form=2.0)])
     assert nominal_instead(even.rivals[0]) == 0.5
     assert left_out(even) == [] and left_out(even, clear) == [even]
+
+
+@pytest.mark.parametrize("part_of_whole", [True, False])
+def test_what_is_not_named_for_the_nominal_chain_is_no_disturbance(monkeypatch, part_of_whole):
+    """An obstacle beside a creep, which may as well be the form of the chain: what the obstacle alone leaves
+    swings slowly, what both leave is noise. It was `unknown`."""
+    monkeypatch.setattr(unexplained, "disturbed", lambda e: SimpleNamespace(**(SLOW if e.slow else QUIET)))
+    monkeypatch.setattr(unexplained, "is_restless", lambda e: False)
+    monkeypatch.setattr(unexplained, "is_rounded", lambda causes: False)
+    for other in (
+        "from_outside",
+        "another",
+        "is_late",
+        "are_apart",
+        "is_uneven",
+        "is_taken_up",
+        "is_unsteady",
+    ):
+        monkeypatch.setattr(unexplained, other, lambda e: False)
+    common = {"converter": None, "segment": SimpleNamespace(closed=False), "amiss": 0.0, "nominal": _fit(9.0)}
+    both = SimpleNamespace(causes=(1, 2), best=_fit(1.0), slow=False, whole=None, **common)
+    obstacle = SimpleNamespace(
+        causes=(1,), best=_fit(6.0), slow=True, whole=both if part_of_whole else None, **common
+    )
+    assert unexplained.is_unknown(obstacle) != part_of_whole
 
 
 @pytest.mark.parametrize("part, off", [(0.25, True), (0.6, False)])
