@@ -6,13 +6,18 @@ Red when a rig with a wide loop is refused ("these logs do not determine T"), or
 that lags at every pace alike.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import cont2discrete, lfilter
 
 from focgen.diagnosis.diagnose import diagnose
 from focgen.errors import FitError
+from focgen.identification import joint_fit, ready
+from focgen.identification.between_samples import Way
 from focgen.identification.identify import identify
+from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
 from focgen.rig.replay import replay
 from focgen.rig.rig import Actuator, Relative, Rig, Signals
@@ -124,6 +129,34 @@ def test_a_loop_is_where_the_way_to_the_first_sample_left_it():
     logs = [Experiment("cut", STEP, {name: values[130:] for name, values in raised.items()})]
     found = identify(RIG, logs, gain_degree=0, integer=False)
     assert looped(found) and found.rig.actuator.T == pytest.approx(T, rel=0.1)
+
+
+@pytest.mark.parametrize("width", [0.0, 0.1])
+def test_a_loop_that_is_not_most_of_it_is_left_to_the_diagnosis(width):
+    """A rig that comes back five times as slowly as it goes: beside it a small loop takes off 62 %."""
+    logs = []
+    for seed in (3, 4):
+        rng = np.random.default_rng(seed)
+        command = levels(rng, 900)
+        output, now = np.empty(900), 0.0
+        for k, level in enumerate(GAIN * play(command, width)):
+            output[k] = now
+            now += (level - now) * (1.0 - np.exp(-STEP / (0.5 if level > now else 2.5)))
+        signals = {"command": command, "output": output + rng.normal(0.0, 0.005, 900)}
+        logs.append(Experiment(f"a{seed}", STEP, signals))
+    found = identify(RIG, logs, gain_degree=0, integer=False)
+    assert not looped(found) and any("the model leaves" in said for said in found.warnings)
+
+
+def test_a_way_without_numbers_widens_no_interval(monkeypatch):
+    """It made T known to 6700 %."""
+    experiments = [ramps(1, 0.3), ramps(2, 0.3)]
+    fit = joint_fit.joint_fit(experiments, RIG, 0, False).found.fit
+    far = replace(fit, T=40.0, half=fit.half | {"T": np.inf})
+    for rival, apart in ((far, set()), (replace(fit, T=2.0), {"T", "alpha", "delay", "gain"})):
+        way = Way(Between.HELD, fit, shown=False, rival=rival)
+        monkeypatch.setattr(ready, "likeliest_way", lambda *_, way=way: way)
+        assert set(ready.as_it_runs(experiments, [None, None], RIG, 0, False)[1]) == apart
 
 
 def test_what_only_rises_may_be_behind_a_dead_zone_as_well():
