@@ -48,7 +48,7 @@ CONSTANTS = {
     "problem/decimate.py": ["_WITHIN"],
     "problem/excitation.py": ["_STEADY"],
     "problem/factors.py": ["LEAST", "WITHIN"],
-    "problem/free.py": ["_PLACES", "_SLACK", "_USUAL"],
+    "problem/free.py": ["_SLACK", "_USUAL"],
     "problem/problem.py": ["ZERO", "_BASELINE", "_BEGUN", "_FAR_OFF", "_OFF", "_QUICKEST", "_STANDS"],
     "problem/segments.py": ["_EITHER", "_FOLLOWED", "_TIMING"],
     "problem/smooth.py": ["_SLOW"],
