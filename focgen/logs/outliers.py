@@ -75,10 +75,11 @@ def _together(along: Array, size: Array, width: int) -> Bools:
 def outliers(
     y: Array, barred: Bools | None = None, never: Bools | None = None, answers: Answers | None = None
 ) -> Bools:
-    """Which readings of ``y`` (n,) are outliers, as a mask (n,); where ``barred`` (n,), only those farther
-    off than all that the signal does, or than ``answers`` say. Where ``never`` (n,), which is ``barred``
-    unless given, they are farther off than both, or leave and come back together with the command; without
-    ``answers`` none is.
+    """Which readings of ``y`` (n,) are outliers, as a mask (n,). Near a jump of the command (``barred``, (n,))
+    only those are that are farther off than all that the signal does, or than the ``answers`` to the command
+    could be; three as many rows behind jumps are none. Near a pulse of it (``never``, (n,); as ``barred``
+    unless given) they have to be farther off than both, or leave and come back together with the command;
+    without ``answers`` none is.
 
     One to three readings in a row count that lie on one side of the line through three neighbours on either
     side, farther off than noise could (a Hampel test on that distance, with the noise of the place), than the

@@ -24,7 +24,7 @@ class GainFreedom(Enum):
     """How far a refit may move the gain of the actuator, where that is not known exactly."""
 
     WITHIN = "within three times its uncertainty"
-    STRAIGHT = "to what is usual about any straighter gain: the curve that was given may be of an effect"
+    STRAIGHT = "to a straight line as well, within what is usual: its curve may be that of an effect"
     ANY = "anywhere"
 
 
