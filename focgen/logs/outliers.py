@@ -75,7 +75,7 @@ def _together(along: Array, size: Array, width: int) -> Bools:
 def outliers(
     y: Array, barred: Bools | None = None, never: Bools | None = None, answers: Answers | None = None
 ) -> Bools:
-    """Which readings of ``y`` (n,) are outliers, as a mask (n,). Near a jump of the command (``barred``, (n,))
+    """Which readings of ``y`` (n,) are outliers, a mask (n,). Near a jump of the command (``barred``, (n,))
     only those are that are farther off than all that the signal does, or than the ``answers`` to the command
     could be; three as many rows behind jumps are none. Near a pulse of it (``never``, (n,); as ``barred``
     unless given) they have to be farther off than both, or leave and come back together with the command;
