@@ -65,7 +65,10 @@ def _stages(text: str) -> tuple[str, ...]:
     return tuple(part.strip() for part in text.split(",") if part.strip())
 
 
-def _next(complete: bool, args: Namespace) -> str:
+def _next(complete: bool, looped: bool, args: Namespace) -> str:
+    if looped:
+        logs = " ".join(str(log) for log in args.logs)
+        return f"next: focgen diagnose {args.out} {logs}, for the rig with its loop"
     if complete:
         return f"next: focgen design {args.out} --out controller.toml"
     return f"next: focgen identify LOG --rig {args.out} --out NEW_RIG, for the actuator"
@@ -103,5 +106,6 @@ def run(args: Namespace) -> Outcome:
     text = f"{identification_text(found)}\n\nwrote {args.out}\n"
     shown = drawn(args.report, lambda: identification_page(found), lambda: identification_pictures(found))
     text += write_with_report(args.out, written, args.report, shown, given)
-    text += _next(found.rig.actuator is not None, args)
+    looped = found.joint is not None and found.joint.play > 0.0
+    text += _next(found.rig.actuator is not None, looped, args)
     return Outcome(identification_payload(found) | {"new_rig": args.out}, text)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scipy.signal import cont2discrete, lfilter
 
+from focgen.cli.main import main
 from focgen.diagnosis.diagnose import diagnose
 from focgen.errors import FitError
 from focgen.identification import joint_fit, ready
@@ -170,6 +171,20 @@ def test_what_is_identified_beside_a_loop_is_diagnosed_as_one():
     found = diagnose(identify(RIG, logs, gain_degree=0, integer=False).rig, logs, pictures=False)
     assert len(found.causes) == 1 and "hysteresis" in {c.effect for c in found.causes[0].candidates}
     assert found.augmented.actuator.T == pytest.approx(T, rel=0.05)
+
+
+def test_the_terminal_leads_on_to_the_diagnosis(tmp_path, capsys):
+    log = ramps(2, 0.3)
+    rows = np.c_[STEP * np.arange(len(log)), log["command"], log["output"]]
+    np.savetxt(tmp_path / "log.csv", rows, delimiter=",", header="t,u,y", comments="")
+    (tmp_path / "rig.toml").write_text(
+        f'name = "r"\nsample_time = {STEP}\n[signals]\ntime = "t"\ncommand = "u"\noutput = "y"\n'
+    )
+    new = tmp_path / "new.toml"
+    argv = ["identify", str(tmp_path / "log.csv"), "--rig", str(tmp_path / "rig.toml"), "--out", str(new)]
+    assert main([*argv, "--no-integer"]) == 0
+    told = capsys.readouterr().out
+    assert f"next: focgen diagnose {new} {tmp_path / 'log.csv'}" in told and "beside a play" in told
 
 
 def test_without_a_loop_nothing_is_told():
