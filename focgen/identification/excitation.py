@@ -56,6 +56,8 @@ class Excitation:
     pressure: Array
     measured: Array
     course: Course
+    jumps: Bools
+    runs: Between
     before: float
     level: float
     input_role: str
@@ -66,8 +68,6 @@ class Excitation:
     reference: Array | None = None
     late: float = 0.0
     begins_up: bool = False
-    jumps: Bools | None = None
-    runs: Between = Between.SMOOTH
 
     def __len__(self) -> int:
         return len(self.measured)
@@ -130,10 +130,8 @@ class Excitation:
         if count >= len(self):
             return self
         pressure, measured = self.pressure[:count], self.measured[:count]
-        jumps = None if self.jumps is None else self.jumps[:count]
-        return replace(
-            self, pressure=pressure, measured=measured, course=self.course.until(count), jumps=jumps
-        )
+        course, jumps = self.course.until(count), self.jumps[:count]
+        return replace(self, pressure=pressure, measured=measured, course=course, jumps=jumps)
 
     def behind(self, play: float) -> Excitation:
         """The same behind a play of the input of half width ``play``, units of it, which lies where the way
@@ -151,8 +149,7 @@ class Excitation:
         return self._driven_by(more[0], float(more[1]))
 
     def _driven_by(self, drive: Array, before: float) -> Excitation:
-        jumps = np.zeros(len(self), bool) if self.jumps is None else self.jumps
-        course = _course(drive, before, self.powers, jumps, self.runs, self.sensor, self.step)
+        course = _course(drive, before, self.powers, self.jumps, self.runs, self.sensor, self.step)
         return replace(self, course=course)
 
     @property
@@ -182,6 +179,8 @@ def prepare(experiment: Experiment, rig: Rig, powers: int = 1, before: float | N
         pressure,
         experiment[fitted],
         course,
+        jumps,
+        between,
         level_before,
         _level(pressure, level_before),
         role,
@@ -192,8 +191,6 @@ def prepare(experiment: Experiment, rig: Rig, powers: int = 1, before: float | N
         reference,
         rig.delays.regulator * (role == "command") + rig.delays.sensor * (fitted == "output"),
         abs(level_before) > _AT_REST * float(np.abs(pressure).max()),
-        jumps,
-        between,
     )
 
 

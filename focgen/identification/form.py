@@ -31,14 +31,12 @@ def lack_of_form(experiments: Sequence[Excitation], fit: FractionalFit) -> float
     if fit.closed_loop:
         return 0.0
     measured = np.concatenate([x.measured for x in experiments])
-    left = np.concatenate(
-        [_levelled(x.measured - y) for x, y in zip(experiments, fit.simulated, strict=True)]
-    )
+    left = np.concatenate([levelled(x.measured - y) for x, y in zip(experiments, fit.simulated, strict=True)])
     drives = [np.asarray(fit.gain) @ x.course.values for x in experiments]
     steps = [x.step for x in experiments]
     response = float(fit.T ** (1.0 / fit.alpha))
     columns = np.hstack(
-        [_drawn(drives, steps, response), np.concatenate([*map(_levelled, fit.simulated)])[:, None]]
+        [_drawn(drives, steps, response), np.concatenate([*map(levelled, fit.simulated)])[:, None]]
     )
     share = foretold(columns, left)
     if share < _SHOWN or not np.ptp(measured) > 0.0:
@@ -46,7 +44,7 @@ def lack_of_form(experiments: Sequence[Excitation], fit: FractionalFit) -> float
     return float(f"{np.sqrt(share * np.mean(left**2)) / np.std(measured):.{_DIGITS}g}")
 
 
-def _levelled(values: Array) -> Array:
+def levelled(values: Array) -> Array:
     """Without its mean: each experiment has an offset of its own."""
     made: Array = np.asarray(values, float) - float(np.mean(values))
     return made
@@ -58,7 +56,7 @@ def _drawn(drives: Sequence[Array], steps: Sequence[float], response: float) -> 
     for v, h in zip(drives, steps):
         kept = [np.exp(-h / max(pace * response, _SAMPLES * h)) for pace in _PACES]
         lags = [lfilter([1.0 - a], [1.0, -a], v) for a in kept]
-        rows.append(np.stack([_levelled(c) for c in (v, *lags)], axis=1))
+        rows.append(np.stack([levelled(c) for c in (v, *lags)], axis=1))
     return np.concatenate(rows)
 
 

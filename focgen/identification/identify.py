@@ -19,7 +19,7 @@ from focgen.identification.form import lack_of_form
 from focgen.identification.fractional import FractionalFit
 from focgen.identification.gain import check_degree, r2_of_line
 from focgen.identification.identification import ExperimentFit, Identification, Joint, Unseen
-from focgen.identification.joint_fit import joint_fit
+from focgen.identification.joint_fit import JointFit, joint_fit
 from focgen.identification.known_actuator import answer_from_its_past
 from focgen.identification.lacking import check_alike
 from focgen.identification.looped import loop_told
@@ -171,9 +171,7 @@ def _actuator(
         delays=replace(rig.delays, actuator=joint.delay),
         uncertainty=replace(rig.uncertainty, actuator=known),
     )
-    if found.width:
-        made = {x.name: answer_from_its_past(x, actuator, joint.delay) for x in joined.plain}
-        joint = replace(joint, play=told_value(found.width, 0.0), simulated=made)
+    joint = _as_written(joint, joined, actuator)
     quality, criterion = _compared(excitations, fits, joint)
     shown = _shown(others, new)
     warnings = loop_told(found) + warnings_of(excitations, fit, fits, failed, {} if found.width else quality)
@@ -181,6 +179,14 @@ def _actuator(
     if compromise:
         told += (_COMPROMISE,)
     return Identification(tuple(fits), joint, new, quality, criterion, warnings, told, shown)
+
+
+def _as_written(joint: Joint, joined: JointFit, actuator: Actuator) -> Joint:
+    """The same with what the rig that is written makes of the input: it has no loop."""
+    if not joined.found.width:
+        return joint
+    made = {x.name: answer_from_its_past(x, actuator, joint.delay) for x in joined.plain}
+    return replace(joint, play=told_value(joined.found.width, 0.0), simulated=made)
 
 
 def _told(experiments: Sequence[Experiment], excitations: list[Excitation]) -> tuple[str, ...]:

@@ -37,36 +37,34 @@ def joint_fit(used: Sequence[Experiment], rig: Rig, degree: int, delay: bool) ->
     Raises FitError where the logs do not determine the parameters.
     """
     befores = befores_of(used, rig, degree + 1)
-    made, reason = None, None
     try:
         made = _fit(used, befores, rig, degree, delay)
-        if not (made.found.width or misfit_of(made.plain, made.found.fit)):
-            return made
-    except FitError as short:
-        reason = short
-    for other in _others(used, befores):
-        made = _closer(made, used, other, rig, degree, delay)
-    if made is None:
-        raise reason or FitError("fit", "has no result", "look at the logs")
-    return made
-
-
-def _others(used: Sequence[Experiment], befores: Befores) -> list[Befores]:
-    """What the input may have been before the experiments instead: what each begins with, or 0."""
-    ways = [possible_rests(e) for e in used]
-    return [other for k in (0, -1) if (other := [way[k] for way in ways]) != befores]
-
-
-def _closer(
-    made: JointFit | None, used: Sequence[Experiment], befores: Befores, rig: Rig, degree: int, delay: bool
-) -> JointFit | None:
-    """``made``, or the fit with these ``befores`` where that is beside a loop and leaves less."""
-    try:
-        other = _fit(used, befores, rig, degree, delay)
     except FitError:
+        if (looped := _looped_otherwise(used, befores, rig, degree, delay)) is None:
+            raise
+        return looped
+    if not (made.found.width or misfit_of(made.plain, made.found.fit)):
         return made
-    closer = made is None or not made.found.width or other.found.left < made.found.left
-    return other if other.found.width and closer else made
+    looped = _looped_otherwise(used, befores, rig, degree, delay)
+    if looped is None or (made.found.width and made.found.left <= looped.found.left):
+        return made
+    return looped
+
+
+def _looped_otherwise(
+    used: Sequence[Experiment], befores: Befores, rig: Rig, degree: int, delay: bool
+) -> JointFit | None:
+    """Of the fits beside a loop, where the input was something else before the experiments than these
+    ``befores``, namely what each begins with, or 0, the one that leaves least; None where there is none."""
+    ways, found = [possible_rests(e) for e in used], []
+    for other in ([way[k] for way in ways] for k in (0, -1)):
+        if other == befores:
+            continue
+        try:
+            found.append(_fit(used, other, rig, degree, delay))
+        except FitError:
+            continue
+    return min((one for one in found if one.found.width), key=lambda one: one.found.left, default=None)
 
 
 def _fit(used: Sequence[Experiment], befores: Befores, rig: Rig, degree: int, delay: bool) -> JointFit:

@@ -1,8 +1,8 @@
 """Where a rig goes round in loops: its model beside a play of the drive, where that is most of what it lacks.
 
-A loop of dry friction or of a fabric is late at every pace alike. No T and α are. A fit that is not told of
-the loop makes T several times too long for it, or ends far out, where 1/(T s^α) is late at every pace alike,
-and only K/T is seen.
+A loop of dry friction or of a fabric is late by as much however slowly the input moves; T and α are late by
+less. A fit that is not told of the loop makes T several times too long for it. Or it ends at a T of 10⁵,
+where no number of it can be told.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ import numpy as np
 from focgen.arrays import Array
 from focgen.errors import FitError
 from focgen.identification.excitation import Excitation
-from focgen.identification.form import foretold
+from focgen.identification.form import foretold, levelled
 from focgen.identification.fractional import FractionalFit
 from focgen.identification.stages import StageFit
 from focgen.logs.between import noise_level
@@ -133,9 +133,8 @@ def _foretold_of(measured: Array, made: Array) -> float:
         return 0.0
     place, way = made / float(np.max(np.abs(made))), np.gradient(made)
     columns = [place, place**2, place**3, np.maximum(way, 0.0), np.minimum(way, 0.0), np.sign(way)]
-    levelled = np.stack([c - np.mean(c) for c in columns], axis=1)
-    left = measured - made
-    share = foretold(levelled, left - np.mean(left))
+    left = levelled(measured - made)
+    share = foretold(np.stack([levelled(c) for c in columns], axis=1), left)
     return float(np.sqrt(share) * np.std(left)) / spread
 
 

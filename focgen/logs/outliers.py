@@ -46,7 +46,7 @@ class _Bounds:
         rows = slice(begin, begin + len(size) + whole - 1)
         barred, never = (_touched(where[rows], whole) for where in (self.barred, self.never))
         far: Bools = size > self.reach
-        if self.answers is None or not barred.any():
+        if self.answers is None or not (barred | never).any():
             return ~never & (~barred | far)
         near, along = (self.jump * x for x in self.answers.between(rows.start, rows.stop))
         beyond = size > sliding_window_view(near, whole).max(axis=1)
@@ -95,7 +95,7 @@ def outliers(
     barred = found.copy() if barred is None else barred
     never = barred if never is None else never
     least, reach = least_noise(y), _reach(y)
-    jump = _jump_beside_sparks(y) if answers is not None and barred.any() else np.inf
+    jump = _jump_beside_sparks(y) if answers is not None and (barred | never).any() else np.inf
     bounds = _Bounds(barred, never, answers if jump < np.inf else None, jump, reach)
     for width in range(1, WIDEST + 1):
         for at in _pulses(y, bounds, width, least):
