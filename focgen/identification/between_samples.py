@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -25,13 +26,14 @@ _SURELY, _LESS = 20.0, 0.95
 
 @dataclass(frozen=True)
 class Tried(Generic[T]):
-    """A ``fit`` of so many ``numbers`` to a command that runs so ``between`` its samples, and what it leaves
-    (n,)."""
+    """A ``fit`` of so many ``numbers`` to a command that runs so ``between`` its samples, ``lead`` s ahead of
+    its rows, and what it leaves (n,)."""
 
     between: Between
     fit: T
     left: Array
     numbers: int = 0
+    lead: float = 0.0
 
     @property
     def square(self) -> float:
@@ -42,12 +44,14 @@ class Tried(Generic[T]):
 @dataclass(frozen=True)
 class Way(Generic[T]):
     """What a command does ``between`` its samples, the ``fit`` with it, and whether that is ``shown`` by the
-    data. ``rival``: the fit with another way that is nearly as likely, None where there is none."""
+    data. ``rival``: the fit with another way that is nearly as likely, None where there is none. ``lead``: by
+    how much it is ahead of its rows, s."""
 
     between: Between
     fit: T
     shown: bool
     rival: T | None = None
+    lead: float = 0.0
 
     @property
     def known(self) -> Between | None:
@@ -55,14 +59,26 @@ class Way(Generic[T]):
         return self.between if self.shown else None
 
 
-def likeliest_way(ways: Sequence[Between], tried: Callable[[Between], Tried[T]], rests: bool) -> Way[T]:
-    """The likeliest of the ``ways`` that a command may run between its samples, by a fit ``tried`` with each.
+def likeliest_way(
+    ways: Sequence[Between],
+    tried: Callable[[Between], Tried[T]],
+    rests: bool,
+    early: Callable[[], Tried[T]] | None = None,
+) -> Way[T]:
+    """The likeliest of the ``ways`` that a command may run between its samples, by a fit ``tried`` with each,
+    and by one with an ``early`` command.
 
     The first of the ways is the usual one: another has to leave far less than it would by chance. Where a
     command ``rests`` between jumps, the usual one is as good as known. Raises FitError where that cannot be
     fitted.
     """
-    usual, others = tried(ways[0]), [found for way in ways[1:] if (found := _if_fitted(tried, way))]
+    usual, others = tried(ways[0]), [found for way in ways[1:] if (found := _if_fitted(partial(tried, way)))]
+    if (
+        early is not None
+        and (found := _if_fitted(early))
+        and all(is_far_likelier(found, other) for other in (usual, *others))
+    ):
+        return Way(found.between, found.fit, shown=True, lead=found.lead)
     closest = min(others, key=lambda other: other.square, default=None)
     if closest is None:
         return Way(usual.between, usual.fit, shown=len(ways) == 1)
@@ -72,9 +88,9 @@ def likeliest_way(ways: Sequence[Between], tried: Callable[[Between], Tried[T]],
     return Way(usual.between, usual.fit, shown, None if rests or shown else closest.fit)
 
 
-def _if_fitted(tried: Callable[[Between], Tried[T]], way: Between) -> Tried[T] | None:
+def _if_fitted(tried: Callable[[], Tried[T]]) -> Tried[T] | None:
     try:
-        return tried(way)
+        return tried()
     except FitError:
         return None
 

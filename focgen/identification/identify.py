@@ -14,7 +14,7 @@ from focgen.custody import identified_from
 from focgen.errors import FitError, LogError, check_choice
 from focgen.identification.caveats import effects_left_out, warnings_of
 from focgen.identification.digits import told_gain, told_value
-from focgen.identification.excitation import Excitation, is_driven, prepare
+from focgen.identification.excitation import Excitation, is_driven
 from focgen.identification.form import lack_of_form
 from focgen.identification.fractional import FractionalFit
 from focgen.identification.gain import check_degree, r2_of_line
@@ -25,9 +25,10 @@ from focgen.identification.lacking import check_alike
 from focgen.identification.looped import loop_told
 from focgen.identification.quality import bic, effective_samples, gof
 from focgen.identification.ranges import seen_ranges
-from focgen.identification.ready import befores_of, running
+from focgen.identification.ready import befores_of, prepared, running
 from focgen.identification.remarks import remarks_of
 from focgen.identification.single import fit_each, is_step
+from focgen.identification.stage_notes import early_told
 from focgen.identification.stages import StageFit, identify_stage
 from focgen.identification.sure import actuator_uncertainty, is_compromise, with_stages
 from focgen.identification.zero import shared_zero
@@ -173,9 +174,10 @@ def _actuator(
     )
     joint = _as_written(joint, joined, actuator)
     quality, criterion = _compared(excitations, fits, joint)
-    shown = _shown(others, new)
+    shown = _shown(others, new, joined.lead)
     warnings = loop_told(found) + warnings_of(excitations, fit, fits, failed, {} if found.width else quality)
-    told = joined.lowered + _told(experiments, excitations) + _zero_told(zero, excitations[0])
+    told = early_told(joined.lead, excitations[0].step, excitations[0].fitted_role)
+    told += joined.lowered + _told(experiments, excitations) + _zero_told(zero, excitations[0])
     if compromise:
         told += (_COMPROMISE,)
     return Identification(tuple(fits), joint, new, quality, criterion, warnings, told, shown)
@@ -242,12 +244,12 @@ def _span(value: float, half: float) -> tuple[float, float]:
     return float(value - half), float(value + half)
 
 
-def _shown(experiments: Sequence[Experiment], rig: Rig) -> tuple[Unseen, ...]:
+def _shown(experiments: Sequence[Experiment], rig: Rig, lead: float) -> tuple[Unseen, ...]:
     """Logs beside what the identified rig makes of their input, each from the initial state that it asks
-    for."""
+    for; ``lead``: s by which their command is ahead of its rows."""
     actuator: Any = rig.actuator
     powers = len(actuator.gain)
-    made = [prepare(e, rig, powers, befores_of([e], rig, powers)[0]) for e in experiments]
+    made = [prepared(e, rig, powers, befores_of([e], rig, powers)[0], lead) for e in experiments]
     return tuple(
         Unseen(x.name, x.pressure, x.measured, y, gof(x.measured, y), not is_step(x))
         for x, y in ((x, answer_from_its_past(x, actuator, rig.delays.actuator)) for x in made)

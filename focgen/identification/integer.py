@@ -156,7 +156,8 @@ class _Projected:
         """Responses to the input of s^zeros/den, …, 1/den, and 1 for an offset, at every ``stride``-th
         sample; (samples, zeros + 1 or 2)."""
         poles = _apart(_poles(self.poles, self.inside(x)))
-        single = [_respond(p, self.experiment)[::stride] for p in poles]
+        late = self.experiment.late / self.experiment.step
+        single = [_later(_respond(p, self.experiment), late)[::stride] for p in poles]
         slopes = [np.prod([p - q for j, q in enumerate(poles) if j != i]) for i, p in enumerate(poles)]
         weights = poles ** np.arange(self.zeros, -1, -1)[:, None] / np.array(slopes)
         rows = np.einsum(
@@ -194,6 +195,16 @@ def _apart(poles: Array) -> Array:
         if np.min(np.abs(made[:i] - made[i])) < _APART * abs(made[i]):
             made[i] *= 1.0 + 10.0 * i * _APART
     return made
+
+
+def _later(made: Array, late: float) -> Array:
+    """A response (n,) from rest ``late`` samples later, in lines between them."""
+    places = np.arange(len(made))
+    if not late:
+        return made
+    parts = [np.interp(places - late, places, part, left=0.0) for part in (made.real, made.imag)]
+    later: Array = parts[0] + 1j * parts[1] if np.iscomplexobj(made) else parts[0]
+    return later
 
 
 def _respond(pole: complex, experiment: Excitation) -> Array:

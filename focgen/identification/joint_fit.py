@@ -7,6 +7,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from focgen.errors import FitError
 from focgen.identification.excitation import Excitation, possible_rests
 from focgen.identification.looped import Fitted, again, fitted
@@ -22,12 +24,13 @@ Befores = list[float | None]
 class JointFit:
     """``rig``: with what its command does between samples; ``found``: the fit, with all that its intervals
     allow for; ``plain``: the experiments without the loop that it may be beside; ``lowered``: what is said
-    where the degree of K(p) was lowered."""
+    where the degree of K(p) was lowered; ``lead``: s by which the command is ahead of its rows."""
 
     rig: Rig
     found: Fitted
     plain: list[Excitation]
     lowered: tuple[str, ...]
+    lead: float = 0.0
 
 
 def joint_fit(used: Sequence[Experiment], rig: Rig, degree: int, delay: bool) -> JointFit:
@@ -68,14 +71,18 @@ def _looped_otherwise(
 
 
 def _fit(used: Sequence[Experiment], befores: Befores, rig: Rig, degree: int, delay: bool) -> JointFit:
-    runs, apart = as_it_runs(used, befores, rig, degree, delay)
-    plain, lowered = ready_for(used, befores, runs, degree)
+    runs = as_it_runs(used, befores, rig, degree, delay)
+    plain, lowered = ready_for(used, befores, runs.rig, degree, runs.lead)
     found = fitted(plain, delay)
-    if found.width:  # what a command does shows beside the loop alone
-        apart = {}
-        other, beside = as_it_runs(used, befores, rig, degree, delay, found.width)
-        ready, _ = ready_for(used, befores, other, degree)
+    pasts = found.fit.pasts if any(past is not None for past in found.fit.pasts) else ()
+    if found.width or pasts:  # what a command does shows beside the loop, and the past, alone
+        runs = replace(runs, apart={}, least={}) if found.width else runs
+        other = as_it_runs(used, befores, rig, degree, delay, found.width, pasts)
+        ready, _ = ready_for(used, befores, other.rig, degree, other.lead)
         if new := again(found, [x.behind(found.width) for x in ready], delay):
-            runs, apart, plain, found = other, beside, ready, new
-    half = {name: found.fit.half[name] + by for name, by in apart.items()}
-    return JointFit(runs, replace(found, fit=replace(found.fit, half=found.fit.half | half)), plain, lowered)
+            runs, plain, found = other, ready, new
+    half = found.fit.half
+    known = {name: half[name] + by for name, by in runs.apart.items()}
+    known |= {name: np.maximum(half[name], by) for name, by in runs.least.items() if name in ("T", "alpha")}
+    found = replace(found, fit=replace(found.fit, half=half | known))
+    return JointFit(runs.rig, found, plain, lowered, runs.lead)

@@ -30,13 +30,13 @@ class Problem:
     def __init__(self, shape: Shape, records: Sequence[Record]) -> None:
         self.shape, self.records = shape, records
         self.longest = max(map(len, records))
-        self.latest = LATEST * min(map(len, records))
+        self.earliest, self.latest = -min(r.early for r in records), LATEST * min(map(len, records))
         around = [r.measured - r.measured.mean() for r in records]
         self.spread = float(np.sqrt(np.mean(np.concatenate(around) ** 2)))
 
     def inside(self, x: Array) -> Array:
         """``x`` within what makes sense."""
-        return inside(self.shape, x, self.longest, self.latest)
+        return inside(self.shape, x, self.longest, self.earliest, self.latest)
 
     def rows(self, x: Array) -> list[tuple[Array, Array]]:
         """Each record's own rows and its shared ones."""

@@ -59,7 +59,8 @@ class Record:
     ``drive`` is the input from its first value on, and the stage was at rest there. Where ``rests`` it
     is the whole input of a log that begins with its step: the stage was at rest at 0 before. Where ``moves``
     the stage is not known to have been at rest at the first sample, and its state there is free. Where it is
-    ``noisy`` the drive was measured; a command is known.
+    ``noisy`` the drive was measured; a command is known. ``early``: by how many samples at most the drive
+    may have been what a row says before what else is in the row was read.
     """
 
     name: str
@@ -69,6 +70,7 @@ class Record:
     rests: bool = False
     moves: bool = False
     noisy: bool = False
+    early: float = 0.0
 
     def __len__(self) -> int:
         return len(self.measured)
@@ -119,8 +121,9 @@ class Discrete:
         return made
 
 
-def inside(shape: Shape, x: Array, longest: int, latest: float) -> Array:
-    """``x`` with every parameter within what ``longest`` samples can tell, the dead time at most ``latest``.
+def inside(shape: Shape, x: Array, longest: int, earliest: float, latest: float) -> Array:
+    """``x`` with every parameter within what ``longest`` samples can tell, the dead time from ``earliest`` to
+    ``latest``.
 
     ``x`` is (log T) for one pole, (log wn, log damping) for two, none for a gain; then the dead time.
     """
@@ -130,12 +133,12 @@ def inside(shape: Shape, x: Array, longest: int, latest: float) -> Array:
         1: [(math.log(_FASTEST), math.log(slowest))],
         2: [(-math.log(slowest), -math.log(_FASTEST)), (math.log(_DAMPING[0]), math.log(_DAMPING[1]))],
     }[shape.poles]
-    low, high = np.array(edges + [(0.0, latest)] * shape.delayed).reshape(-1, 2).T
+    low, high = np.array(edges + [(earliest, latest)] * shape.delayed).reshape(-1, 2).T
     return np.clip(x, low, high)
 
 
 def delay_of(shape: Shape, x: Array) -> float:
-    """The dead time in samples."""
+    """The dead time in samples; less than 0 where the drive was early."""
     return float(x[-1]) if shape.delayed else 0.0
 
 
@@ -173,7 +176,9 @@ def _integrals(system: Array, span: float) -> tuple[Array, Array, Array]:
 
 
 def shifted(signal: Array, late: int) -> Array:
-    """``signal`` (n,) ``late`` samples later, 0 before it."""
+    """``signal`` (n,) ``late`` samples later, 0 before it; or so many sooner, held at its end."""
+    if late < 0:
+        return np.concatenate([signal[-late:], np.full(min(-late, len(signal)), signal[-1])])
     return np.concatenate([np.zeros(min(late, len(signal))), signal[: max(len(signal) - late, 0)]])
 
 

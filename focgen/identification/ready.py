@@ -4,22 +4,26 @@ between their samples."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 
+from focgen.arrays import Array
 from focgen.errors import FitError
 from focgen.identification.between_samples import Tried, at_rest, likeliest_way, ways_of
 from focgen.identification.excitation import Excitation, possible_rests, prepare
 from focgen.identification.fractional import FractionalFit, fit_fractional
 from focgen.identification.gain import feasible_degree
-from focgen.identification.past import worth_it
+from focgen.identification.past import Past, worth_it
 from focgen.identification.sure import has_numbers
 from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
 from focgen.rig.engine import between_of
 from focgen.rig.rig import Rig
+
+_LATE = 0.5  # samples that an output may be late without a dead time: a row may be read before it is sent
+_FINE = 50.0  # samples in a time constant: then a part of one changes no number by what it is known to
 
 
 def befores_of(experiments: Sequence[Experiment], rig: Rig, powers: int) -> list[float | None]:
@@ -51,13 +55,43 @@ def _fitted(excitations: list[Excitation]) -> FractionalFit:
 
 
 def ready_for(
-    experiments: Sequence[Experiment], befores: Sequence[float | None], rig: Rig, degree: int
+    experiments: Sequence[Experiment],
+    befores: Sequence[float | None],
+    rig: Rig,
+    degree: int,
+    lead: float = 0.0,
 ) -> tuple[list[Excitation], tuple[str, ...]]:
     """The experiments, with what the input was before each, made ready for a K(p) of the ``degree``, or of
-    one that they show, which it says."""
-    ready = [prepare(e, rig, degree + 1, before) for e, before in zip(experiments, befores)]
+    one that they show, which it says; ``lead``: s by which the command is ahead of its rows."""
+    ready = [prepared(e, rig, degree + 1, before, lead) for e, before in zip(experiments, befores)]
     possible, lowered = feasible_degree(ready, degree)
     return [x.with_powers(possible + 1) for x in ready], lowered
+
+
+def prepared(e: Experiment, rig: Rig, powers: int, before: float | None, lead: float) -> Excitation:
+    """An experiment made ready whose command was sent ``lead`` s ahead of its row: a sample sooner, and late
+    by the rest of one."""
+    if not lead:
+        return prepare(e, rig, powers, before)
+    command, signals = e["command"], dict(e.signals)
+    if before is None:
+        signals["command"] = np.r_[command[:1], command[2:], command[-1:]]
+    else:  # it was sent ahead of the first row, which has no sooner one: as well all that was read comes later
+        signals |= {role: np.r_[e[role][:1], e[role][:-1]] for role in ("curvature", "output") if role in e}
+    x = prepare(replace(e, signals=signals), rig, powers, before)
+    return replace(x, late=x.late + x.step - lead)
+
+
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """How a command runs: the ``rig`` with what it does between samples, and the s of its ``lead`` on its
+    rows. ``apart``: by how much each of the numbers found is another where it may do something else;
+    ``least``: how well each is known at most."""
+
+    rig: Rig
+    lead: float = 0.0
+    apart: dict[str, Array | float] = field(default_factory=dict)
+    least: dict[str, Array | float] = field(default_factory=dict)
 
 
 def as_it_runs(
@@ -67,30 +101,43 @@ def as_it_runs(
     degree: int,
     delay: bool,
     play: float = 0.0,
-) -> tuple[Rig, dict[str, Any]]:
-    """The rig with what its command does between samples, where that drives the fit, and by how much each of
-    the numbers found is another where it may do something else. Pasts are left to the fit itself: they take
-    longest. ``play``: the half width of a loop that all this is behind, units of the input."""
+    pasts: Sequence[Past | None] = (),
+) -> Runs:
+    """How the command runs, where that drives the fit. ``play``: the half width of a loop that all this is
+    behind, units of the input; ``pasts``: those of experiments that begin in motion, where they are known."""
 
-    def tried(way: Between) -> Tried[FractionalFit]:
-        plain, _ = ready_for(experiments, befores, replace(rig, between=way), degree)
+    @cache
+    def tried(way: Between, delay: bool = delay, lead: float = 0.0) -> Tried[FractionalFit]:
+        plain, _ = ready_for(experiments, befores, replace(rig, between=way), degree, lead)
         ready = [x.behind(play) for x in plain]
-        fit = fit_fractional(ready, delay, pasts=[None] * len(ready))
+        fit = fit_fractional(ready, delay, pasts=pasts or [None] * len(ready))
         left = np.concatenate([(x.measured - y) / x.spread for x, y in zip(ready, fit.simulated)])
         return Tried(way, fit, left)
 
+    def early() -> Tried[FractionalFit]:
+        step, usual = experiments[0].sample_time, tried(ways[0]).fit
+        if usual.T ** (1.0 / usual.alpha) > _FINE * step:
+            raise FitError("command", "shows no part of a sample", "take it as it was logged")
+        found = tried(Between.HELD, True, step)
+        if not 0.0 <= found.fit.delay <= (1.0 if delay else 1.0 + _LATE) * step:
+            raise FitError("command", "is out of step by no part of a sample", "take it as it was logged")
+        return replace(found, numbers=1, lead=step - found.fit.delay)
+
     commands = [e["command"] for e in experiments if "pressure" not in e]
     ways = ways_of(rig.between, commands) if len(commands) == len(experiments) else ()
-    if len(ways) < 2:
-        return rig, {}
+    may_be_early = bool(ways) and ways[0] == Between.HELD and at_rest(commands)
+    if len(ways) < 2 and not may_be_early:
+        return Runs(rig)
     try:
-        way = likeliest_way(ways, tried, at_rest(commands))
+        way = likeliest_way(ways, tried, at_rest(commands), early if may_be_early else None)
     except FitError:  # without numbers nothing tells the ways apart: the fit itself says so, or finds a loop
-        return rig, {}
+        return Runs(rig)
+    if way.lead:
+        return Runs(running(rig, way.known), way.lead, least=way.fit.half)
     if way.rival is None or not has_numbers(way.rival):
-        return running(rig, way.known), {}
+        return Runs(running(rig, way.known))
     names = ("T", "alpha", "delay", "gain")[: 4 if len(way.fit.gain) == len(way.rival.gain) else 3]
-    return rig, {n: np.abs(getattr(way.fit, n) - getattr(way.rival, n)) for n in names}
+    return Runs(rig, apart={n: np.abs(getattr(way.fit, n) - getattr(way.rival, n)) for n in names})
 
 
 def running(rig: Rig, between: Between | None) -> Rig:

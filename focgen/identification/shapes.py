@@ -220,9 +220,9 @@ def _refusal(problem: Problem, made: dict[str, tuple[float, float]], step: float
     """Why a shape cannot be what the data show."""
     held = problem.records[0].hold == "zero"
     delay, half = made.get("delay", (np.inf, 0.0))
-    if delay < _NO_DELAY * step:
+    if abs(delay) < _NO_DELAY * step:
         return "no dead time"
-    if delay - half <= 0.0 and (problem.shape.poles or not held):
+    if abs(delay) - half <= 0.0 and (problem.shape.poles or not held):
         return "the dead time's interval reaches 0"
     zero, half = made.get("zero", (np.inf, 0.0))
     if zero < 0.0:
@@ -246,5 +246,5 @@ def _is_vague(name: str, value: float, half: float, step: float) -> bool:
 
 
 def delay_seconds(fitted: Fitted, step: float) -> float:
-    """The dead time in s."""
+    """The dead time in s; less than 0 where the drive was early."""
     return delay_of(fitted.shape, fitted.solved.x) * step

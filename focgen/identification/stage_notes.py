@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from focgen.identification.directions import UpDown
 from focgen.identification.input_noise import attenuation
-from focgen.identification.shapes import MARGIN, Fitted
+from focgen.identification.shapes import MARGIN, Fitted, delay_seconds
 
 _WORDS = {
     "regulator": ("fills", "vents", "pressure", "the valve's asymmetry"),
@@ -26,7 +26,8 @@ def notes_of(
     """Sentences on a stage's fit; ``given`` names all experiments, ``step`` is the sample time in s."""
     records = chosen.problem.records
     used = {r.name for r in records}
-    said = _directions(stage, chosen, up_down) + _rate(stage, chosen, step) + _rivals(chosen, fits)
+    said = [*early_told(max(-delay_seconds(chosen, step), 0.0), step, _WORDS[stage][2])]
+    said += _directions(stage, chosen, up_down) + _rate(stage, chosen, step) + _rivals(chosen, fits)
     said += [f"{r.name}: begins with its step; taken as at rest at 0 before" for r in records if r.rests]
     if left := [name for name in given if name not in used]:
         said.append(f"{', '.join(left)}: not used, too short or without the {stage}'s two signals")
@@ -34,6 +35,19 @@ def notes_of(
     if compared < sum(map(len, records)):
         said.append(f"the shapes were compared on {compared} samples, the one taken was fitted to all")
     return (*said, *_attenuated(chosen))
+
+
+def early_told(lead: float, step: float, signal: str) -> tuple[str, ...]:
+    """That a ``signal`` answers ``lead`` s ahead of the command's rows, ``step`` s apart, where it does; or
+    behind them, where that is less than 0."""
+    if not lead:
+        return ()
+    if lead < 0.0:
+        what = f"{-lead:.2g} s ({-lead / step:.2g} samples) behind its command: taken for columns out of step"
+        return (f"the {signal} answers {what}, and not written; give --delay where it is a dead time",)
+    what = f"{lead:.2g} s ({lead / step:.2g} samples) ahead of its command, as no rig does"
+    why = "each row has what was sent, and what was read so much later; the rig is written without that"
+    return (f"the {signal} answers {what}: {why}",)
 
 
 def _directions(stage: str, chosen: Fitted, found: UpDown | None) -> list[str]:

@@ -39,6 +39,8 @@ _SIGNALS = {"regulator": ("command", "pressure"), "sensor": ("curvature", "outpu
 _FEWEST = 30  # samples
 _MOST = 50_000  # samples that the shapes are compared on
 _SHOWS = 8  # samples that show whether a log begins at rest
+_EARLY = 1.0  # samples that a command which rests between jumps may be ahead of its row: a row may have what
+# was sent, and what was read as the next one came. Another command shows no such thing apart from a lag
 _MOVES = 10.0  # times its noise: a signal that moves by more has answered to a step
 
 
@@ -48,7 +50,8 @@ class StageFit:
 
     ``stage`` is "regulator" or "sensor", ``transfer`` and ``delay`` (s) what the rig takes. ``shape`` is one
     of "gain", "1p", "2p", "2p1z", each with "+delay" where there is one. ``parameters`` maps gain, T or T1
-    and T2 or wn and damping, zero and delay to (value, half 95 % interval), times in s, wn in rad/s.
+    and T2 or wn and damping, zero, and delay, or the ``lead`` of a command that was early, to (value, half
+    95 % interval), times in s, wn in rad/s.
     ``gain_relative`` and ``time_relative`` are half 95 % intervals relative to the values. ``between``: what
     its input does between samples, None where that is not to be told. ``fits``: every shape
     that was tried. ``up_down``: time constants of the two directions, None where they are not both seen.
@@ -101,9 +104,9 @@ def identify_stage(experiments: Sequence[Experiment], stage: str, between: Betwe
     return StageFit(
         stage=stage,
         transfer=transfer_of(chosen.report.parameters),
-        delay=delay_seconds(chosen, step),
+        delay=max(delay_seconds(chosen, step), 0.0),
         shape=chosen.report.shape,
-        parameters=chosen.report.parameters,
+        parameters=_led(chosen.report.parameters),
         gain_relative=chosen.half["gain"],
         time_relative=_time_relative(chosen),
         between=way.known,
@@ -116,6 +119,14 @@ def identify_stage(experiments: Sequence[Experiment], stage: str, between: Betwe
         step=step,
         notes=notes_of(stage, [e.name for e in experiments], chosen, fits, up_down, step),
     )
+
+
+def _led(parameters: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+    """The parameters, with a dead time of less than 0 as what it is: no rig answers ahead of its command."""
+    delay, half = parameters.get("delay", (0.0, 0.0))
+    if delay >= 0.0:
+        return parameters
+    return {name: pair for name, pair in parameters.items() if name != "delay"} | {"lead": (-delay, half)}
 
 
 def transfer_of(parameters: dict[str, tuple[float, float]]) -> TransferFunction:
@@ -192,7 +203,8 @@ def _record(experiment: Experiment, stage: str, between: Between) -> Record:
     rests = stage == "regulator" and np.ptp(drive) == 0.0 and bool(drive[0]) and _answers(measured)
     moves = not (rests or _still(drive, measured))
     drive = drive if rests else drive - drive[0]
-    return Record(experiment.name, drive, measured, hold, bool(rests), moves, noisy=stage == "sensor")
+    early = _EARLY * (between == Between.HELD and at_rest([drive]))
+    return Record(experiment.name, drive, measured, hold, bool(rests), moves, stage == "sensor", early)
 
 
 def _still(drive: Array, measured: Array) -> bool:

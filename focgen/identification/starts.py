@@ -99,7 +99,8 @@ def starts_of(problem: Problem, found: dict[Shape, Array], scanned: Sequence[Arr
     if shape.poles == 1:
         plain = found.get(Shape(1))
         if shape.delayed:
-            return [*scanned, *([] if plain is None else [np.append(plain, 0.5)])]
+            beside = (0.5, 0.5 * problem.earliest) if problem.earliest else (0.5,)
+            return [*scanned, *([] if plain is None else [np.append(plain, late) for late in beside])]
         return [start[:1] for start in scanned[:2]]
     return _starts_of_two(problem, found, scanned)
 
@@ -110,7 +111,8 @@ def _starts_of_two(problem: Problem, found: dict[Shape, Array], scanned: Sequenc
     late = float(one[-1]) if shape.delayed else 0.0
     starts = second_order(problem, float(np.exp(one[0])), (0.3 * late, 0.7 * late, late))
     if shape.delayed and (plain := found.get(Shape(2, shape.zeros))) is not None:
-        starts.append(np.append(plain, 0.3))
+        beside = (0.3, 0.5 * problem.earliest) if problem.earliest else (0.3,)
+        starts += [np.append(plain, late) for late in beside]
     if shape.zeros and (without := found.get(Shape(2, 0, shape.delayed))) is not None:
         starts.append(without)
     return starts

@@ -18,6 +18,7 @@ from focgen.rig.courses import sharpened
 from focgen.rig.delay import centred, delayed
 from focgen.rig.dynamics import FREE, SAME, STEADY, UNCHANGED, Dynamics, Lever, Pace
 from focgen.rig.effects import EQUATIONS, Run
+from focgen.rig.finer import at_samples, finer, parts_of
 from focgen.rig.lever import levered
 from focgen.rig.modes import respond
 from focgen.rig.placed import EARLY, LAST, LATE, Placed
@@ -65,6 +66,23 @@ class Chain:
             left[:] = [{} for _ in self.placed]
         if run.begins:
             return self._begun(x, first, last, run, between, tap, left)
+        parts = parts_of(self.rig, first, last, run.h) if between == Between.HELD else 1
+        if parts > 1:
+            x = self._once("parts", parts, x, lambda x, run: np.repeat(x, parts), run)
+            y = self._run(x, first, last, finer(run, parts), between, tap, left)
+            return at_samples(y, tap, parts)
+        return self._run(x, first, last, run, between, tap, left)
+
+    def _run(
+        self,
+        x: Array,
+        first: str,
+        last: str,
+        run: Run,
+        between: Between | bool,
+        tap: dict[str, Array] | None,
+        left: list[dict[str, float]] | None,
+    ) -> Array:
         tapped = {} if tap is None else tap
         begin, end = STAGES.index(first), STAGES.index(last)
         keeps = {p.stage for p in self.placed if p.remembers and p.slot in EQUATIONS.values()}

@@ -418,14 +418,26 @@ def test_what_left_for_the_nominal_chain_is_kept_in_mind(monkeypatch, part, off)
     """A bent spring of a quarter of what the chain is off by leaves; one that was in vain leaves no trace."""
     odds = 300.0 if off else -1.0
     curve = SimpleNamespace(rivals=[replace(_rival("contact", odds, part * NUMBERS.bent), separation=0.0)])
-    left = {"with": (curve,), "without": ()}
+    with_it, without = _fit(1.0, ("contact",)), _fit(9.0)
+    left = {with_it: (curve,), without: ()}
     monkeypatch.setattr(rivals, "_causes", lambda best, beside: left[best])
-    monkeypatch.setattr(rivals, "without_family", lambda *_: "without")
+    monkeypatch.setattr(rivals, "without_family", lambda *_: without)
     beside = SimpleNamespace(granted=False, weighing=None, known=())
-    found = rivals.reexamined("with", beside)
-    assert found.best == "without" and not found.causes
+    found = rivals.reexamined(with_it, beside)
+    assert found.best is without and not found.causes
     assert (found.off is not None) == off
-    assert not off or (found.off.best == "with" and found.off.causes == (curve,))
+    assert not off or (found.off.best is with_it and found.off.causes == (curve,))
+
+
+def test_of_two_forms_that_are_not_needed_the_family_keeps_one(monkeypatch):
+    """An exhaust at 37 nats was lost with the second lag that a fit had put beside it."""
+    both, one = (_fit(1.0, ("valve_asymmetry",) * forms, cost=0.0) for forms in (2, 1))
+    odds = {both: -3.5, one: 32.0}
+    rival = {of: replace(_rival("valve_asymmetry", nats, 2.0), separation=0.0) for of, nats in odds.items()}
+    monkeypatch.setattr(rivals, "_causes", lambda best, _: (SimpleNamespace(rivals=[rival[best]]),))
+    monkeypatch.setattr(rivals, "left_out", lambda *_: one)
+    found = rivals.reexamined(both, SimpleNamespace(granted=False, weighing=None, known=()))
+    assert found.best is one and len(found.causes) == 1
 
 
 @pytest.mark.parametrize("explained", [True, False])

@@ -12,7 +12,8 @@ import pytest
 from focgen.diagnosis.fitting.fit import WHITE, _cost, _solved, fit, innovations, jacobian
 from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.hypotheses.search import best_start, footings
-from focgen.diagnosis.problem.problem import CandidateEffect, Problem
+from focgen.diagnosis.problem.candidates import CandidateEffect
+from focgen.diagnosis.problem.problem import Problem
 from focgen.diagnosis.problem.segments import make
 from focgen.rig.effects import Form, Parameter, library
 from tests.diagnosis_rig import RIG, session

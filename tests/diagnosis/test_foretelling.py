@@ -18,7 +18,8 @@ from focgen.diagnosis.hypotheses.foretelling import foretelling
 from focgen.diagnosis.hypotheses.initial import begun_session
 from focgen.diagnosis.hypotheses.nuisances import problem_of, uncertain
 from focgen.diagnosis.hypotheses.search import evidence
-from focgen.diagnosis.problem.problem import CandidateEffect, Problem
+from focgen.diagnosis.problem.candidates import CandidateEffect
+from focgen.diagnosis.problem.problem import Problem
 from focgen.diagnosis.problem.segments import make
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment

@@ -157,7 +157,7 @@ def test_a_way_without_numbers_widens_no_interval(monkeypatch):
     for rival, apart in ((far, set()), (replace(fit, T=2.0), {"T", "alpha", "delay", "gain"})):
         way = Way(Between.HELD, fit, shown=False, rival=rival)
         monkeypatch.setattr(ready, "likeliest_way", lambda *_, way=way: way)
-        assert set(ready.as_it_runs(experiments, [None, None], RIG, 0, False)[1]) == apart
+        assert set(ready.as_it_runs(experiments, [None, None], RIG, 0, False).apart) == apart
 
 
 def test_what_only_rises_may_be_behind_a_dead_zone_as_well():

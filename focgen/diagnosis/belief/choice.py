@@ -9,7 +9,7 @@ import numpy as np
 from focgen.diagnosis.belief.further import Ground
 from focgen.diagnosis.fitting.fit import Fit
 from focgen.diagnosis.numbers import NUMBERS
-from focgen.diagnosis.problem.problem import CandidateEffect
+from focgen.diagnosis.problem.candidates import CandidateEffect
 
 NEAR = 6.0  # nats: of families that are further behind no further form is asked
 _BEHIND = 50.0  # nats, whatever nominal parameters cost: so far behind none is the likeliest

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from focgen.diagnosis.fitting.fit import FIXED
-from focgen.diagnosis.problem.problem import CandidateEffect
+from focgen.diagnosis.problem.candidates import CandidateEffect
 
 _EITHER_WAY = 0.25 * FIXED  # of a reference: what is held may move either way
 

@@ -27,7 +27,7 @@ from focgen.diagnosis.hypotheses.search import (
     on_all,
 )
 from focgen.diagnosis.numbers import NUMBERS
-from focgen.diagnosis.problem.problem import CandidateEffect
+from focgen.diagnosis.problem.candidates import CandidateEffect
 
 _TRIED = 4  # families: beside so many of the foremost the earlier effects are looked for
 _FITTED = 10  # iterations

@@ -11,7 +11,7 @@ import numpy as np
 from focgen.diagnosis.fitting.noise import coloured
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.hypotheses.search import rank
-from focgen.diagnosis.problem.problem import CandidateEffect
+from focgen.diagnosis.problem.candidates import CandidateEffect
 from focgen.progress import say
 
 _RARE = 0.02  # of the sessions without any effect may pass the threshold

@@ -18,7 +18,8 @@ from focgen.diagnosis.fitting.pinned import pinned
 from focgen.diagnosis.hypotheses.blurred import noise_ahead, part_that_stays
 from focgen.diagnosis.hypotheses.rivals import Cause, Rival, share_of
 from focgen.diagnosis.numbers import NUMBERS
-from focgen.diagnosis.problem.problem import CandidateEffect, Problem
+from focgen.diagnosis.problem.candidates import CandidateEffect
+from focgen.diagnosis.problem.problem import Problem
 from focgen.rig import kernels
 from focgen.rig.effects import form_of, library
 from focgen.rig.effects._effect import Run, Values

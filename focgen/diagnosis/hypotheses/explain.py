@@ -26,7 +26,8 @@ from focgen.diagnosis.hypotheses.search import Ranking, evidence, rank
 from focgen.diagnosis.hypotheses.seen_through import with_steps
 from focgen.diagnosis.hypotheses.two import TwoOthers, two_at_once, two_others
 from focgen.diagnosis.numbers import NUMBERS
-from focgen.diagnosis.problem.problem import CandidateEffect, Problem
+from focgen.diagnosis.problem.candidates import CandidateEffect
+from focgen.diagnosis.problem.problem import Problem
 from focgen.diagnosis.problem.segments import Segment, is_single, owner
 from focgen.diagnosis.problem.smooth import Strays
 from focgen.logs.between import Between

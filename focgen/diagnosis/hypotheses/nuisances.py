@@ -28,7 +28,8 @@ from focgen.rig.rig import Rig
 from focgen.rig.session import entry_of
 
 # of the rig's response: what columns may be out of step by; more is a delay. A whole sample is the most, and
-# half of one where an input jumps, for a loop may read before it writes, the least
+# half of one where an input jumps, for a loop may read before it writes, the least. A row may have a command
+# and what was read a sample later: no rig does that, so by as much the output of a staircase may be early
 _OUT_OF_STEP, _HALF = 0.05, 0.5
 _GAUGE = 0.01  # of its reading: by what a gauge may be off without being a fault
 _WAYS = (Between.HELD, Between.STRAIGHT, Between.SMOOTH)  # of a command between its samples
@@ -49,9 +50,9 @@ def problem_of(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Proble
     segment = replace(segment, pace=pace(rig, segment.stages, scales.clocks["response"]))
     least = _HALF if any(map(_jumps, segment.fed.parts(segment.fed.x))) else 0.0
     slack = float(np.clip(_OUT_OF_STEP * scales.clocks["response"] / segment.fed.run.h, least, 1.0))
-    return Problem(
-        segment, NominalParameters(rig, segment.stages, freely, load, response), scales, slack=slack
-    )
+    lead = 1.0 if least and segment.between == Between.HELD else slack
+    own = NominalParameters(rig, segment.stages, freely, load, response)
+    return Problem(segment, own, scales, slack=slack, lead=lead)
 
 
 def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:

@@ -13,7 +13,7 @@ import numpy as np
 from focgen.diagnosis.fitting.fit import WHITE, Fit, fit
 from focgen.diagnosis.hypotheses.search import evidence
 from focgen.diagnosis.numbers import NUMBERS
-from focgen.diagnosis.problem.problem import CandidateEffect
+from focgen.diagnosis.problem.candidates import CandidateEffect
 from focgen.rig.placed import on_one_side
 
 _FITTED = 10  # iterations

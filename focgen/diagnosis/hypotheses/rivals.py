@@ -14,7 +14,8 @@ from focgen.diagnosis.belief.standing import any_of, behind, holds, nominal_off
 from focgen.diagnosis.fitting.fit import Fit, Weighing, fit, problem_residual
 from focgen.diagnosis.fitting.integrating import as_they_show
 from focgen.diagnosis.hypotheses.search import Ranking, evidence, is_itself, on_all, rank
-from focgen.diagnosis.problem.problem import CandidateEffect, Problem
+from focgen.diagnosis.problem.candidates import CandidateEffect
+from focgen.diagnosis.problem.problem import Problem
 from focgen.rig.effects import library
 
 _SWAPS = 3
@@ -89,7 +90,8 @@ class Examined:
 def reexamined(best: Fit, beside: Beside) -> Examined:
     """Every effect held against its rivals beside the others; where one of them does better, it takes the
     place, and where none is likelier than that nothing more is there, as what came later may make it, all
-    leave it. So they do where the nominal chain is as good as sure to be off by itself."""
+    leave it, of a family in two forms one of them first. So they do where the nominal chain is as good as
+    sure to be off by itself."""
     off, swaps = None, 0
     while swaps < _SWAPS:
         causes = _causes(best, beside)
@@ -102,8 +104,18 @@ def reexamined(best: Fit, beside: Beside) -> Examined:
         if needless is None or _needed(needless) >= 0.0 or beside.granted:
             return Examined(best, causes, off)
         off = Examined(best, causes) if holds(needless.off) else None
-        best = without_family(best, needless.effect, beside.weighing, beside.known)
+        best = _lighter(best, needless.effect, beside)
     return Examined(best, _causes(best, beside), off)
+
+
+def _lighter(best: Fit, name: str, beside: Beside) -> Fit:
+    """Without the form of this family that is missed least, for what two of them are not needed for one may
+    be; without the family, where it has one form."""
+    own = [c for c in best.problem.candidates if c.effect == name]
+    weighing, known = beside.weighing, beside.known
+    if len(own) == 1:
+        return without_family(best, name, weighing, known)
+    return min((left_out(best, [form], weighing, known) for form in own), key=lambda f: f.cost)
 
 
 def _needed(rival: Rival) -> float:

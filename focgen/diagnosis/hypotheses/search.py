@@ -16,7 +16,8 @@ from focgen.diagnosis.fitting.noise import fit_ar
 from focgen.diagnosis.fitting.repeats import without_hearsay
 from focgen.diagnosis.hypotheses.abreast import abreast
 from focgen.diagnosis.numbers import NUMBERS
-from focgen.diagnosis.problem.problem import CandidateEffect, Problem
+from focgen.diagnosis.problem.candidates import CandidateEffect
+from focgen.diagnosis.problem.problem import Problem
 from focgen.rig.plant import plant_of
 from focgen.rig.rig import LinearActuator
 

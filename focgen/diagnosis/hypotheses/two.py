@@ -20,7 +20,7 @@ from focgen.diagnosis.hypotheses.accept import AcceptanceCriteria
 from focgen.diagnosis.hypotheses.anew import looked_anew
 from focgen.diagnosis.hypotheses.search import Ranking, family, on_all, rank
 from focgen.diagnosis.numbers import NUMBERS
-from focgen.diagnosis.problem.problem import CandidateEffect
+from focgen.diagnosis.problem.candidates import CandidateEffect
 from focgen.rig.effects import EQUATIONS
 
 _TRIED = 4  # families that are taken for granted

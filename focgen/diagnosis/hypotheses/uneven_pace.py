@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from focgen.diagnosis.problem.problem import CandidateEffect, Problem
+from focgen.diagnosis.problem.candidates import CandidateEffect
+from focgen.diagnosis.problem.problem import Problem
 from focgen.rig.changeable import fits_in
 from focgen.rig.dynamics import Dynamics, Pace
 from focgen.rig.effects import EQUATIONS, Form, Parameter

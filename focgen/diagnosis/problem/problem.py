@@ -10,13 +10,16 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from focgen.diagnosis.problem.aligned import first_of_whole_orders, is_ahead, later, sooner
+from focgen.diagnosis.problem.candidates import CandidateEffect, References
 from focgen.diagnosis.problem.excitation import excitation
 from focgen.diagnosis.problem.free import gain_freedom
 from focgen.diagnosis.problem.held import may_have_held, tells_what_is_held
 from focgen.diagnosis.problem.nominal_parameters import NominalParameters
 from focgen.diagnosis.problem.segments import Segment
+from focgen.logs.between import Between
 from focgen.rig.begun import with_stands
-from focgen.rig.effects import Effect, Excitation, Form, Parameter, Run, library
+from focgen.rig.effects import Excitation, Parameter, Run, library
 from focgen.rig.engine import Chain
 from focgen.rig.placed import Placed, slot_in
 from focgen.rig.rig import Rig
@@ -33,51 +36,17 @@ _STANDS = 0.1  # of the level: what a volume is off by that is told through an a
 _BASELINE = 0.005  # of the level: what the zero of a reading differs by from one experiment to the next
 
 
-@dataclass(frozen=True)
-class CandidateEffect:
-    """An effect to be fitted: family, form, and the stage it is put in."""
-
-    effect: str
-    form: Form
-    stage: str
-
-    @property
-    def name(self) -> str:
-        """Family and form."""
-        return f"{self.effect}/{self.form.name}"
-
-    @property
-    def family(self) -> Effect | None:
-        """Its family, None where none of the library is."""
-        return library().get(self.effect)
-
-
-@dataclass(frozen=True)
-class References:
-    """What multiples are taken of: a level by slot, and the clocks in s."""
-
-    levels: dict[str, float]
-    clocks: dict[str, float]
-
-    def scale(self, parameter: Parameter, slot: str) -> float:
-        """The physical size of 1 in units of this parameter."""
-        made: float = (
-            self.levels[parameter.at or slot] ** parameter.level
-            * self.clocks[parameter.clock] ** parameter.time
-        )
-        return made
-
-
 @dataclass(eq=False)
 class Problem:
     """Residuals of a segment under the rig with ``candidates``.
 
-    The vector: the rig's nominal parameters, the nuisances (the alignment of input and output, at most
-    ``slack`` samples; where nothing of the segment has an offset of its own, one, and its gauge's error, at
-    most ``gauge`` of what it reads; how far a simulated input is off in each of the ways it may be, in
-    standard deviations; how far the begins of experiments are, likewise; where readings are ``uneven``, the
-    zero of each experiment's, likewise; where what a pump held is told through an actuator, how far each
-    experiment's is off, likewise), then every candidate effect's parameters, all of order one.
+    The vector: the rig's nominal parameters, the nuisances (the alignment of input and output, the output
+    late by at most ``slack`` samples, or early by at most ``lead``; where nothing of the segment has an
+    offset of its own, one, and its gauge's error, at most ``gauge`` of what it reads; how far a simulated
+    input is off in each of the ways it may be, in standard deviations; how far the begins of experiments are,
+    likewise; where readings are ``uneven``, the zero of each experiment's, likewise; where what a pump held
+    is told through an actuator, how far each experiment's is off, likewise), then every candidate effect's
+    parameters, all of order one.
     ``weight``: of what is known of nominal parameters beforehand, against the data. ``zero_within``: the ends
     of the zero of the segment's readings, of the level.
     """
@@ -88,6 +57,7 @@ class Problem:
     candidates: tuple[CandidateEffect, ...] = ()
     memory: dict[Any, Any] = field(default_factory=dict)
     slack: float = 1.0
+    lead: float = 1.0
     gauge: float = 0.0
     uneven: bool = False
     weight: float = 1.0
@@ -159,7 +129,8 @@ class Problem:
 
     def thinned(self, factor: int) -> Problem:
         """The same on means of ``factor`` samples at a time."""
-        return replace(self, segment=self.segment.thinned(factor), memory={}, slack=self.slack / factor)
+        slack, lead = self.slack / factor, self.lead / factor
+        return replace(self, segment=self.segment.thinned(factor), memory={}, slack=slack, lead=lead)
 
     def stretched(self, vector: np.ndarray, factor: float) -> np.ndarray:
         """``vector`` with its alignment, which is in samples, times ``factor``."""
@@ -196,9 +167,10 @@ class Problem:
         ends, (modes, loose) = self.nominals.bounds(), (self.segment.input_modes, self.segment.loose)
         ways = [_OFF] * modes.shape[1] + [_BEGUN] * loose.shape[1]
         zeros = [*[self._drift] * self.zeros, *[_OFF] * self.stood]
-        nuisance = [0.0 if self._shifted else self.slack, *self.gauges, *ways, *zeros]
-        low: list[float] = [*ends[0], *(-b for b in nuisance)]
-        high: list[float] = [*ends[1], *nuisance]
+        lead, late = (0.0, 0.0) if self._shifted else (self.lead, self.slack)
+        others = [*self.gauges, *ways, *zeros]
+        low: list[float] = [*ends[0], -lead, *(-b for b in others)]
+        high: list[float] = [*ends[1], late, *others]
         for candidate in self.candidates:
             for p in candidate.form.parameters:
                 least = self._least(p) if p.log else p.lower
@@ -260,6 +232,20 @@ class Problem:
         values, given = vector[: len(self.nominal_start)], self.nominals.rig
         return self._lately("rigs", values.tobytes(), given, partial(self.nominals.put, given, values))
 
+    @cached_property
+    def _enters(self) -> str | None:
+        """The stage whose dead time says how far columns are out of step, where a part of a sample shows: the
+        input is a staircase, by which the output may be early."""
+        stair = self.lead > self.slack and self.segment.fed.between == Between.HELD
+        return first_of_whole_orders(self.nominals.rig, self.segment.stages) if stair else None
+
+    def _aligned(self, rig: Rig, shift: float, probe: bool) -> Rig:
+        """``rig`` with the output ``shift`` samples later; the same object where it is as lately."""
+        stage, h = self._enters, self.segment.fed.run.h
+        if stage is None or not shift:
+            return rig
+        return self._lately("aligned", shift, rig, partial(later, rig, stage, shift * h, h), probe)
+
     def placed(self, vector: np.ndarray) -> tuple[Placed, ...]:
         """The candidate effects as effects of a chain."""
         return tuple(
@@ -270,13 +256,16 @@ class Problem:
         """The segment's output (n,), in the log's units; a ``probe`` leaves nothing to the simulations that
         follow, which go on from another vector. A plant that runs away with these numbers leaves no finite
         ones, which no fit takes: that is no fault to warn of."""
-        chain = Chain(self.rig(vector), self.placed(vector), self.memory, probe)
         own, segment = len(self.nominal_start), self.segment
+        rig = self._aligned(self.rig(vector), float(vector[own]), probe)
+        chain = Chain(rig, self.placed(vector), self.memory, probe)
         gauges, off, begun, zeros, stood = self._parted(vector[own + 1 : self.head])
         run = self._begun(stood, probe)
         x = self._entered(float(vector[own]), off, probe)
         with np.errstate(over="ignore", invalid="ignore"):
             made = chain.run(x, segment.stages[0], segment.stages[-1], run, segment.between)
+        if self._enters and is_ahead(self.nominals.rig, self._enters, vector[own] * run.h):
+            made = sooner(made, run.rest)
         made = self._read(made if segment.readings is None else made[segment.readings], *gauges)
         made = made + self._kept("loose", begun, segment.loose.__matmul__, probe) if begun.any() else made
         return made + self._kept("zeros", zeros, self._uneven, probe) if zeros.any() else made
@@ -363,6 +352,7 @@ class Problem:
     def _entered(self, shift: float, off: np.ndarray, probe: bool) -> np.ndarray:
         """The input, ``shift`` samples out of step and ``off`` in the ways it is unsure; the same array where
         nothing changed, by which a chain remembers what it made of it."""
+        shift = 0.0 if self._enters else shift  # the rig makes it
         key = (shift, *off.tolist())
         if not any(key):
             return self.segment.fed.bent

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from focgen.diagnosis.problem.problem import References
+from focgen.diagnosis.problem.candidates import References
 from focgen.diagnosis.problem.segments import Segment
 from focgen.logs.experiment import Experiment
 from focgen.rig.engine import Chain

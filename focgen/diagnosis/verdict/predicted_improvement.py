@@ -10,7 +10,7 @@ import numpy as np
 from focgen.diagnosis.fitting.fit import Weighing
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.hypotheses.rivals import left_out
-from focgen.diagnosis.problem.problem import CandidateEffect
+from focgen.diagnosis.problem.candidates import CandidateEffect
 from focgen.diagnosis.verdict import compose
 from focgen.diagnosis.verdict.cross_validation import cross_validated
 from focgen.diagnosis.verdict.improvement import Improvement, predict
