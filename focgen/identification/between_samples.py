@@ -73,12 +73,9 @@ def likeliest_way(
     fitted.
     """
     usual, others = tried(ways[0]), [found for way in ways[1:] if (found := _if_fitted(partial(tried, way)))]
-    if (
-        early is not None
-        and (found := _if_fitted(early))
-        and all(is_far_likelier(found, other) for other in (usual, *others))
-    ):
-        return Way(found.between, found.fit, shown=True, lead=found.lead)
+    first = _if_fitted(early) if early else None
+    if first and is_far_likelier(first, usual) and all(_is_likelier(first, other) for other in others):
+        return Way(first.between, first.fit, shown=True, lead=first.lead)
     closest = min(others, key=lambda other: other.square, default=None)
     if closest is None:
         return Way(usual.between, usual.fit, shown=len(ways) == 1)
@@ -108,6 +105,13 @@ def ways_of(given: Between | None, commands: Sequence[Array]) -> tuple[Between, 
 def at_rest(commands: Sequence[Array]) -> bool:
     """Whether commands (n,) rest but for jumps."""
     return bool(np.mean(np.concatenate([np.diff(x) == 0.0 for x in commands])) > _RESTS)
+
+
+def _is_likelier(one: Tried[T], other: Tried[T]) -> bool:
+    """Whether a fit is better than another one by Schwarz's criterion."""
+    independent = effective_samples(one.left)
+    more = (one.numbers - other.numbers) * np.log(independent)
+    return bool(independent * np.log(other.square / one.square) > more)
 
 
 def is_far_likelier(one: Tried[T], other: Tried[T]) -> bool:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -20,6 +21,7 @@ from scipy.signal import lfilter
 from focgen.arrays import Array, Numbers
 from focgen.errors import FitError
 from focgen.identification.excitation import Excitation
+from focgen.identification.rational import shifted
 
 SHAPES = tuple((poles, zeros) for poles in (1, 2, 3) for zeros in range(poles))
 """(poles, zeros) of every strictly proper pair, by rising number of poles, then of zeros."""
@@ -156,8 +158,7 @@ class _Projected:
         """Responses to the input of s^zeros/den, …, 1/den, and 1 for an offset, at every ``stride``-th
         sample; (samples, zeros + 1 or 2)."""
         poles = _apart(_poles(self.poles, self.inside(x)))
-        late = self.experiment.late / self.experiment.step
-        single = [_later(_respond(p, self.experiment), late)[::stride] for p in poles]
+        single = [_respond(p, self.experiment)[::stride] for p in poles]
         slopes = [np.prod([p - q for j, q in enumerate(poles) if j != i]) for i, p in enumerate(poles)]
         weights = poles ** np.arange(self.zeros, -1, -1)[:, None] / np.array(slopes)
         rows = np.einsum(
@@ -197,25 +198,25 @@ def _apart(poles: Array) -> Array:
     return made
 
 
-def _later(made: Array, late: float) -> Array:
-    """A response (n,) from rest ``late`` samples later, in lines between them."""
-    places = np.arange(len(made))
-    if not late:
-        return made
-    parts = [np.interp(places - late, places, part, left=0.0) for part in (made.real, made.imag)]
-    later: Array = parts[0] + 1j * parts[1] if np.iscomplexobj(made) else parts[0]
-    return later
-
-
 def _respond(pole: complex, experiment: Excitation) -> Array:
-    """1/(s − pole) at the samples, exactly for jumps and straight lines; time in samples."""
+    """1/(s − pole) at the samples, exactly for jumps and straight lines, as late as the experiment; time in
+    samples."""
     if pole.imag == 0.0:
         pole = pole.real  # half the work
     course, decay = experiment.course, np.exp(pole)
-    mean = np.expm1(pole) / pole  # weight of what is there throughout a sample …
-    late = (mean - 1.0) / pole if abs(pole) > 1e-4 else 0.5 + pole / 6.0  # … and of a line that rises to 1
-    held: Array = lfilter([0.0, mean], [1.0, -decay], course.values[0].astype(type(decay)))
-    if not np.any(course.straight[0]):
-        return held
-    made: Array = held + lfilter([late], [1.0, -decay], course.straight[0].astype(type(decay)))
-    return made
+    values, straight = (v[0].astype(type(decay)) for v in (course.values, course.straight))
+    held, line = _driven(pole, 1.0)
+    made: Array = lfilter([0.0, held], [1.0, -decay], values)
+    made = made + lfilter([line], [1.0, -decay], straight) if np.any(straight) else made
+    whole, part = divmod(experiment.late / experiment.step, 1.0)
+    if part:  # where it was at a share of the sample
+        held, line = _driven(pole, 1.0 - part)
+        made = np.exp(pole * (1.0 - part)) * shifted(made, 1) + held * shifted(values, 1) + line * straight
+    return shifted(made, int(whole))
+
+
+def _driven(pole: complex, share: float) -> tuple[Any, Any]:
+    """What is made, in a ``share`` of a sample, of 1, and of a line that rises to 1 by the sample's end."""
+    held = np.expm1(pole * share) / pole
+    small = abs(pole) * share <= 1e-4
+    return held, share**2 * (0.5 + pole * share / 6.0) if small else (held - share) / pole

@@ -76,7 +76,7 @@ def prepared(e: Experiment, rig: Rig, powers: int, before: float | None, lead: f
     command, signals = e["command"], dict(e.signals)
     if before is None:
         signals["command"] = np.r_[command[:1], command[2:], command[-1:]]
-    else:  # it was sent ahead of the first row, which has no sooner one: as well all that was read comes later
+    else:  # its first jump is in the first row, where none is sooner: as well all that was read comes later
         signals |= {role: np.r_[e[role][:1], e[role][:-1]] for role in ("curvature", "output") if role in e}
     x = prepare(replace(e, signals=signals), rig, powers, before)
     return replace(x, late=x.late + x.step - lead)
@@ -121,7 +121,7 @@ def as_it_runs(
         found = tried(Between.HELD, True, step)
         if not 0.0 <= found.fit.delay <= (1.0 if delay else 1.0 + _LATE) * step:
             raise FitError("command", "is out of step by no part of a sample", "take it as it was logged")
-        return replace(found, numbers=1, lead=step - found.fit.delay)
+        return replace(found, numbers=1 - delay, lead=step - found.fit.delay)
 
     commands = [e["command"] for e in experiments if "pressure" not in e]
     ways = ways_of(rig.between, commands) if len(commands) == len(experiments) else ()

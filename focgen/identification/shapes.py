@@ -20,7 +20,7 @@ T = TypeVar("T")
 _FIRST_ROUNDS, _ROUNDS, _LAST_ROUNDS = 4, 12, 8  # of Levenberg–Marquardt: every start, best one, all samples
 _ROUGHLY = 6000  # samples for all but the last rounds
 _SMALL = 0.1  # of a record: a longer dead time needs more than a part of it
-_NO_DELAY = 0.1  # samples: a dead time below it is none
+_NO_DELAY, _NO_LEAD = 0.1, 0.02  # samples: a dead time, or a lead, below it is none
 MARGIN = 6.0  # of Schwarz's criterion: odds of e³ = 20 to 1 (Kass and Raftery, J. Am. Stat. Assoc. 90, 1995)
 
 
@@ -220,7 +220,7 @@ def _refusal(problem: Problem, made: dict[str, tuple[float, float]], step: float
     """Why a shape cannot be what the data show."""
     held = problem.records[0].hold == "zero"
     delay, half = made.get("delay", (np.inf, 0.0))
-    if abs(delay) < _NO_DELAY * step:
+    if -_NO_LEAD * step < delay < _NO_DELAY * step:
         return "no dead time"
     if abs(delay) - half <= 0.0 and (problem.shape.poles or not held):
         return "the dead time's interval reaches 0"

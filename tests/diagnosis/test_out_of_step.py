@@ -1,0 +1,80 @@
+"""Columns out of step by a part of a sample, where samples are few in a time constant.
+
+Red when a command that was sent ahead of its row is called a fault of the rig.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from focgen.diagnosis.diagnose import diagnose
+from focgen.diagnosis.hypotheses.nuisances import problem_of
+from focgen.diagnosis.problem.aligned import first_of_whole_orders, sooner
+from focgen.diagnosis.problem.segments import make
+from focgen.fractional.simulation import Convolution
+from focgen.fractional.transfer import TransferFunction
+from focgen.logs.between import Between
+from focgen.logs.experiment import Experiment
+from focgen.rig.rig import Actuator, LinearActuator, Rig, Signals
+from tests.identification.test_out_of_step import FINE, GAIN, TAU, H, T, lag, moved, steps
+
+PLANT = TransferFunction([(1.0, 0.0)], [(T, 0.8), (1.0, 0.0)])
+REGULATOR = TransferFunction([(1.1, 0.0)], [(TAU, 1.0), (1.0, 0.0)])
+RIG = Rig("finger", H, Signals("t", "y", "u"), Actuator(T, 0.8, (GAIN,)), regulator=REGULATOR)
+
+
+def logs_of(lead, noise, limit=np.inf, count=600):
+    """Two logs of steps, the command ``lead`` samples ahead of its rows and limited by the supply."""
+    rng, logs = np.random.default_rng(7), []
+    for number in range(2):
+        command = steps(rng, count)
+        pressure = lag(np.minimum(1.1 * moved(command, lead), limit), TAU)
+        made = GAIN * Convolution(PLANT, H / FINE, "linear").run(pressure)[::FINE]
+        signals = {"command": command, "output": made + rng.normal(0.0, noise, count)}
+        logs.append(Experiment(f"e{number}", H, signals, start=900.0 * number))
+    return logs
+
+
+@pytest.mark.parametrize("lead", [-0.4, -0.1, 0.0, 0.1, 0.5, 0.9, 1.0])
+def test_a_staircase_out_of_step_is_simulated_as_it_was(lead):
+    logs = logs_of(lead, 0.0)
+    problem = problem_of(RIG, make(logs, "command", "output"), logs)
+    vector = problem.nominal()
+    vector[len(problem.nominal_start)] = -lead
+    low, high = problem.bounds()
+    assert np.all(low <= vector) and np.all(vector <= high)
+    left = problem.simulate(vector) - problem.segment.y
+    kept = np.ones(len(left), bool)
+    kept[[599, 1199]] = False  # what comes behind the last sample is guessed
+    assert np.max(np.abs(left[kept])) < 2e-3 * np.ptp(problem.segment.y)
+
+
+@pytest.mark.parametrize("lead", [0.1, 0.4, 0.9])
+def test_a_healthy_rig_is_healthy(lead):
+    found = diagnose(RIG, logs_of(lead, 0.004), pictures=False)
+    assert found.verdict in ("none", "parameters") and not found.causes
+
+
+def test_what_is_there_is_found_beside_it():
+    found = diagnose(RIG, logs_of(0.4, 0.004, limit=2.6), pictures=False)
+    assert [c.candidates[0].effect for c in found.causes] == ["supply_saturation"]
+    assert found.causes[0].candidates[0].confidence > 0.5
+
+
+def test_only_a_staircase_into_whole_orders_is_moved_by_a_dead_time():
+    """What rises by t^α has no slope where it jumps, by which a fit could go."""
+    stages = ("regulator", "actuator", "sensor")
+    assert first_of_whole_orders(RIG, stages) == "regulator"
+    assert first_of_whole_orders(RIG, stages[1:]) is None
+    assert first_of_whole_orders(replace(RIG, actuator=LinearActuator(REGULATOR)), stages[1:]) == "actuator"
+    smooth = [replace(log, signals={**log.signals, "command": np.sin(log.time)}) for log in logs_of(0.0, 0.0)]
+    problem = problem_of(RIG, make(smooth, "command", "output").anew(between=Between.HELD), smooth)
+    assert problem.lead == problem.slack
+
+
+def test_each_experiment_is_sooner_by_itself():
+    y, rest = np.array([0.0, 1.0, 4.0, 10.0, 20.0]), np.array([1, 0, 0, 2, 0], np.uint8)
+    np.testing.assert_allclose(sooner(y, rest), [1.0, 4.0, 7.0, 20.0, 30.0])
