@@ -63,17 +63,17 @@ def likeliest_way(
     ways: Sequence[Between],
     tried: Callable[[Between], Tried[T]],
     rests: bool,
-    early: Callable[[], Tried[T]] | None = None,
+    early: Callable[[T], Tried[T]] | None = None,
 ) -> Way[T]:
     """The likeliest of the ``ways`` that a command may run between its samples, by a fit ``tried`` with each,
-    and by one with an ``early`` command.
+    and by one with an ``early`` command, which is told the usual one.
 
     The first of the ways is the usual one: another has to leave far less than it would by chance. Where a
     command ``rests`` between jumps, the usual one is as good as known. Raises FitError where that cannot be
     fitted.
     """
     usual, others = tried(ways[0]), [found for way in ways[1:] if (found := _if_fitted(partial(tried, way)))]
-    first = _if_fitted(early) if early else None
+    first = _if_fitted(partial(early, usual.fit)) if early else None
     if first and is_far_likelier(first, usual) and all(_is_likelier(first, other) for other in others):
         return Way(first.between, first.fit, shown=True, lead=first.lead)
     closest = min(others, key=lambda other: other.square, default=None)

@@ -3,9 +3,9 @@ between their samples."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
 
 import numpy as np
 
@@ -22,7 +22,9 @@ from focgen.logs.experiment import Experiment
 from focgen.rig.engine import between_of
 from focgen.rig.rig import Rig
 
+_EARLIEST = 2  # samples that a command may be ahead of its row: more is another row's
 _LATE = 0.5  # samples that an output may be late without a dead time: a row may be read before it is sent
+_NONE = 0.02  # samples: less out of step is none
 _FINE = 50.0  # samples in a time constant: then a part of one changes no number by what it is known to
 
 
@@ -69,17 +71,21 @@ def ready_for(
 
 
 def prepared(e: Experiment, rig: Rig, powers: int, before: float | None, lead: float) -> Excitation:
-    """An experiment made ready whose command was sent ``lead`` s ahead of its row: a sample sooner, and late
-    by the rest of one."""
+    """An experiment made ready whose command was sent ``lead`` s ahead of its row: whole samples sooner, and
+    late by what that is too much. Where the command moves in the first rows, whose sooner ones nobody logged,
+    it stays, and all that was read comes as much later."""
     if not lead:
         return prepare(e, rig, powers, before)
     command, signals = e["command"], dict(e.signals)
-    if before is None:
-        signals["command"] = np.r_[command[:1], command[2:], command[-1:]]
-    else:  # its first jump is in the first row, where none is sooner: as well all that was read comes later
-        signals |= {role: np.r_[e[role][:1], e[role][:-1]] for role in ("curvature", "output") if role in e}
+    count = max(math.ceil(lead / e.sample_time), 0) or 1
+    if before is None and not np.ptp(command[: count + 1]):
+        signals["command"] = np.r_[command[:1], command[count + 1 :], np.full(count, command[-1])]
+    else:
+        for role in ("curvature", "output"):
+            if role in e:
+                signals[role] = np.r_[np.full(count, e[role][0]), e[role][:-count]]
     x = prepare(replace(e, signals=signals), rig, powers, before)
-    return replace(x, late=x.late + x.step - lead)
+    return replace(x, late=x.late + count * x.step - lead)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +100,45 @@ class Runs:
     least: dict[str, Array | float] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class _Trials:
+    """Fits to ``experiments`` whose command runs in one way or another; the rest as of :func:`as_it_runs`."""
+
+    experiments: Sequence[Experiment]
+    befores: Sequence[float | None]
+    rig: Rig
+    degree: int
+    delay: bool
+    play: float
+    pasts: Sequence[Past | None]
+
+    def fit(self, way: Between, delay: bool | None = None, lead: float = 0.0) -> Tried[FractionalFit]:
+        """The fit to a command that runs so, ``lead`` s ahead of its rows."""
+        plain, _ = ready_for(
+            self.experiments, self.befores, replace(self.rig, between=way), self.degree, lead
+        )
+        ready, delay = [x.behind(self.play) for x in plain], self.delay if delay is None else delay
+        fit = fit_fractional(ready, delay, pasts=self.pasts or [None] * len(ready))
+        spreads = [float(np.std(e[x.fitted_role])) for e, x in zip(self.experiments, ready)]
+        left = np.concatenate([(x.measured - y) / w for x, y, w in zip(ready, fit.simulated, spreads)])
+        return Tried(way, fit, left)
+
+    def early(self, usual: FractionalFit) -> Tried[FractionalFit]:
+        """The fit to a held command that is ahead of its rows; FitError where that does not show: nor does it
+        where the ``usual`` fit has many samples in a time constant."""
+        step = self.experiments[0].sample_time
+        if usual.T ** (1.0 / usual.alpha) > _FINE * step:
+            raise FitError("command", "shows no part of a sample", "take it as it was logged")
+        for count in range(1, _EARLIEST + 1):
+            found = self.fit(Between.HELD, True, count * step)
+            if found.fit.delay > _NONE * step:
+                break
+        lead = count - found.fit.delay / step
+        if not (_NONE < lead < _EARLIEST - _NONE or (-_LATE < lead < -_NONE and not self.delay)):
+            raise FitError("command", "is out of step by no part of a sample", "take it as it was logged")
+        return replace(found, numbers=1 - self.delay, lead=lead * step)
+
+
 def as_it_runs(
     experiments: Sequence[Experiment],
     befores: Sequence[float | None],
@@ -105,31 +150,14 @@ def as_it_runs(
 ) -> Runs:
     """How the command runs, where that drives the fit. ``play``: the half width of a loop that all this is
     behind, units of the input; ``pasts``: those of experiments that begin in motion, where they are known."""
-
-    @cache
-    def tried(way: Between, delay: bool = delay, lead: float = 0.0) -> Tried[FractionalFit]:
-        plain, _ = ready_for(experiments, befores, replace(rig, between=way), degree, lead)
-        ready = [x.behind(play) for x in plain]
-        fit = fit_fractional(ready, delay, pasts=pasts or [None] * len(ready))
-        left = np.concatenate([(x.measured - y) / x.spread for x, y in zip(ready, fit.simulated)])
-        return Tried(way, fit, left)
-
-    def early() -> Tried[FractionalFit]:
-        step, usual = experiments[0].sample_time, tried(ways[0]).fit
-        if usual.T ** (1.0 / usual.alpha) > _FINE * step:
-            raise FitError("command", "shows no part of a sample", "take it as it was logged")
-        found = tried(Between.HELD, True, step)
-        if not 0.0 <= found.fit.delay <= (1.0 if delay else 1.0 + _LATE) * step:
-            raise FitError("command", "is out of step by no part of a sample", "take it as it was logged")
-        return replace(found, numbers=1 - delay, lead=step - found.fit.delay)
-
     commands = [e["command"] for e in experiments if "pressure" not in e]
     ways = ways_of(rig.between, commands) if len(commands) == len(experiments) else ()
-    may_be_early = bool(ways) and ways[0] == Between.HELD and at_rest(commands)
-    if len(ways) < 2 and not may_be_early:
+    steps = bool(ways) and ways[0] == Between.HELD and any(map(np.ptp, commands)) and at_rest(commands)
+    if len(ways) < 2 and not steps:
         return Runs(rig)
+    trials = _Trials(experiments, befores, rig, degree, delay, play, pasts)
     try:
-        way = likeliest_way(ways, tried, at_rest(commands), early if may_be_early else None)
+        way = likeliest_way(ways, trials.fit, at_rest(commands), trials.early if steps else None)
     except FitError:  # without numbers nothing tells the ways apart: the fit itself says so, or finds a loop
         return Runs(rig)
     if way.lead:

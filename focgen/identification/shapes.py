@@ -222,6 +222,8 @@ def _refusal(problem: Problem, made: dict[str, tuple[float, float]], step: float
     delay, half = made.get("delay", (np.inf, 0.0))
     if -_NO_LEAD * step < delay < _NO_DELAY * step:
         return "no dead time"
+    if delay < (_NO_LEAD + problem.earliest) * step and delay < 0.0:
+        return "the command is out of step by more than is looked for"
     if abs(delay) - half <= 0.0 and (problem.shape.poles or not held):
         return "the dead time's interval reaches 0"
     zero, half = made.get("zero", (np.inf, 0.0))

@@ -43,10 +43,10 @@ def early_told(lead: float, step: float, signal: str) -> tuple[str, ...]:
     if not lead:
         return ()
     if lead < 0.0:
-        what = f"{-lead:.2g} s ({-lead / step:.2g} samples) behind its command: taken for columns out of step"
+        what = f"{-lead:.2g} s ({-lead / step:.2g} samples) behind its command: columns out of step, it seems"
         return (f"the {signal} answers {what}, and not written; give --delay where it is a dead time",)
     what = f"{lead:.2g} s ({lead / step:.2g} samples) ahead of its command, as no rig does"
-    why = "each row has what was sent, and what was read so much later; the rig is written without that"
+    why = "its rows have a command beside what was read later. The rig is written without that"
     return (f"the {signal} answers {what}: {why}",)
 
 
@@ -66,7 +66,7 @@ def _directions(stage: str, chosen: Fitted, found: UpDown | None) -> list[str]:
 def _rate(stage: str, chosen: Fitted, step: float) -> list[str]:
     if chosen.shape.poles:
         return []
-    if chosen.shape.delayed and chosen.report.parameters["delay"][0] <= step * 1.001:
+    if chosen.shape.delayed and 0.0 <= chosen.report.parameters["delay"][0] <= step * 1.001:
         return [
             (
                 f"the {stage} follows within one sample of {step:g} s; how fast cannot be seen, and a dead "

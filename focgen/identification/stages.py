@@ -39,7 +39,7 @@ _SIGNALS = {"regulator": ("command", "pressure"), "sensor": ("curvature", "outpu
 _FEWEST = 30  # samples
 _MOST = 50_000  # samples that the shapes are compared on
 _SHOWS = 8  # samples that show whether a log begins at rest
-_EARLY = 1.0  # samples that a command which rests between jumps may be ahead of its row: a row may have what
+_EARLY = 2.0  # samples that a command which rests between jumps may be ahead of its row: a row may have what
 # was sent, and what was read as the next one came. Another command shows no such thing apart from a lag
 _MOVES = 10.0  # times its noise: a signal that moves by more has answered to a step
 
@@ -49,9 +49,9 @@ class StageFit:
     """A stage as identified.
 
     ``stage`` is "regulator" or "sensor", ``transfer`` and ``delay`` (s) what the rig takes. ``shape`` is one
-    of "gain", "1p", "2p", "2p1z", each with "+delay" where there is one. ``parameters`` maps gain, T or T1
-    and T2 or wn and damping, zero, and delay, or the ``lead`` of a command that was early, to (value, half
-    95 % interval), times in s, wn in rad/s.
+    of "gain", "1p", "2p", "2p1z", each with "+delay" or "+lead" where there is one. ``parameters`` maps gain,
+    T or T1 and T2 or wn and damping, zero, and delay, or the lead of a command that was early, to (value,
+    half 95 % interval), times in s, wn in rad/s.
     ``gain_relative`` and ``time_relative`` are half 95 % intervals relative to the values. ``between``: what
     its input does between samples, None where that is not to be told. ``fits``: every shape
     that was tried. ``up_down``: time constants of the two directions, None where they are not both seen.
@@ -105,13 +105,13 @@ def identify_stage(experiments: Sequence[Experiment], stage: str, between: Betwe
         stage=stage,
         transfer=transfer_of(chosen.report.parameters),
         delay=max(delay_seconds(chosen, step), 0.0),
-        shape=chosen.report.shape,
-        parameters=_led(chosen.report.parameters),
+        shape=_led(chosen.report).shape,
+        parameters=_led(chosen.report).parameters,
         gain_relative=chosen.half["gain"],
         time_relative=_time_relative(chosen),
         between=way.known,
         gof=chosen.report.gof,
-        fits=tuple(f.report for f in fits),
+        fits=tuple(_led(f.report) for f in fits),
         up_down=up_down,
         names=tuple(e.name for e in used),
         measured=tuple(r.measured for r in chosen.problem.records),
@@ -121,12 +121,14 @@ def identify_stage(experiments: Sequence[Experiment], stage: str, between: Betwe
     )
 
 
-def _led(parameters: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
-    """The parameters, with a dead time of less than 0 as what it is: no rig answers ahead of its command."""
-    delay, half = parameters.get("delay", (0.0, 0.0))
+def _led(of: ShapeFit) -> ShapeFit:
+    """A shape with its dead time of less than 0 as what it is: no rig answers ahead of its command."""
+    delay, half = of.parameters.get("delay", (0.0, 0.0))
     if delay >= 0.0:
-        return parameters
-    return {name: pair for name, pair in parameters.items() if name != "delay"} | {"lead": (-delay, half)}
+        return of
+    others = {name: pair for name, pair in of.parameters.items() if name != "delay"}
+    shape = of.shape.replace("+delay", "+lead")
+    return replace(of, shape=shape, parameters=others | {"lead": (-delay, half)})
 
 
 def transfer_of(parameters: dict[str, tuple[float, float]]) -> TransferFunction:

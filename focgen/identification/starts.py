@@ -99,7 +99,7 @@ def starts_of(problem: Problem, found: dict[Shape, Array], scanned: Sequence[Arr
     if shape.poles == 1:
         plain = found.get(Shape(1))
         if shape.delayed:
-            beside = (0.5, 0.5 * problem.earliest) if problem.earliest else (0.5,)
+            beside = (0.5, -0.5, -1.5) if problem.earliest else (0.5,)
             return [*scanned, *([] if plain is None else [np.append(plain, late) for late in beside])]
         return [start[:1] for start in scanned[:2]]
     return _starts_of_two(problem, found, scanned)
@@ -111,7 +111,7 @@ def _starts_of_two(problem: Problem, found: dict[Shape, Array], scanned: Sequenc
     late = float(one[-1]) if shape.delayed else 0.0
     starts = second_order(problem, float(np.exp(one[0])), (0.3 * late, 0.7 * late, late))
     if shape.delayed and (plain := found.get(Shape(2, shape.zeros))) is not None:
-        beside = (0.3, 0.5 * problem.earliest) if problem.earliest else (0.3,)
+        beside = (0.3, -0.5, -1.5) if problem.earliest else (0.3,)
         starts += [np.append(plain, late) for late in beside]
     if shape.zeros and (without := found.get(Shape(2, 0, shape.delayed))) is not None:
         starts.append(without)

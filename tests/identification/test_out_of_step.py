@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from focgen.errors import FitError
 from focgen.fractional.simulation import Convolution
 from focgen.fractional.transfer import TransferFunction
 from focgen.identification.identify import identify
@@ -126,3 +127,48 @@ def test_a_command_that_never_rests_is_ahead_of_nothing():
         logs.append(Experiment(f"e{number}", H, {"command": command, "output": made}, start=900.0 * number))
     found = identify(PLANT, logs, integer=False)
     assert not any("ahead of its command" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("lead", [1.3, 1.8])
+def test_a_command_may_be_more_than_a_sample_ahead(lead):
+    found = identify(PLANT, logs_of(lead), integer=False)
+    assert found.rig.actuator.T == pytest.approx(T, rel=0.01)
+    assert any(f"({lead:g} samples) ahead" in note for note in found.notes)
+
+
+def test_what_is_further_ahead_is_refused():
+    """It was taken for one sample, with K known to 6 % and 10 % off."""
+    with pytest.raises(FitError, match="look at its columns"):
+        identify(PLANT, logs_of(2.6), integer=False)
+
+
+@pytest.mark.parametrize("lead", [0.6, 0.0])
+def test_a_log_whose_command_moves_in_the_second_row(lead):
+    rng, up = np.random.default_rng(3), np.r_[0.0, np.full(COUNT - 1, 2.0)]
+    pulse = np.where(np.arange(COUNT) == 1, 2.0, 0.0)
+    for commands in ([up], [pulse, steps(rng)]):
+        logs = []
+        for number, command in enumerate(commands):
+            made = GAIN * lag(moved(command, lead), T)[::FINE] + rng.normal(0.0, NOISE, COUNT)
+            logs.append(Experiment(f"e{number}", H, {"command": command, "output": made}))
+        found = identify(PLANT, logs, integer=False, gain_degree=0)
+        assert found.rig.actuator.T == pytest.approx(T, rel=0.02)
+        assert found.rig.actuator.gain[0] == pytest.approx(GAIN, rel=0.02)
+
+
+def test_a_command_that_never_moves_is_ahead_of_nothing():
+    rng = np.random.default_rng(4)
+    made = GAIN * lag(np.full(300 * FINE, 2.0), T)[::FINE] + rng.normal(0.0, NOISE, 300)
+    found = identify(
+        PLANT, [Experiment("e", H, {"command": np.full(300, 2.0), "output": made})], integer=False
+    )
+    assert not any("its command" in note for note in found.notes) and found.rig.between is None
+
+
+def test_the_tables_call_a_lead_a_lead():
+    found = identify(PLANT, logs_of(0.5, pressure=True), stages=("regulator",), integer=False)
+    fit = found.stages["regulator"]
+    assert fit.shape == "1p+lead"
+    for one in fit.fits:
+        assert one.parameters.get("delay", (0.0,))[0] >= 0.0
+        assert ("lead" in one.parameters) == one.shape.endswith("+lead")

@@ -115,7 +115,8 @@ def _lighter(best: Fit, name: str, beside: Beside) -> Fit:
     weighing, known = beside.weighing, beside.known
     if len(own) == 1:
         return without_family(best, name, weighing, known)
-    return min((left_out(best, [form], weighing, known) for form in own), key=lambda f: f.cost)
+    others = [left_out(best, [form], weighing, known) for form in own]
+    return min(others, key=lambda without: evidence(best, without))
 
 
 def _needed(rival: Rival) -> float:

@@ -257,14 +257,14 @@ class Problem:
         follow, which go on from another vector. A plant that runs away with these numbers leaves no finite
         ones, which no fit takes: that is no fault to warn of."""
         own, segment = len(self.nominal_start), self.segment
-        rig = self._aligned(self.rig(vector), float(vector[own]), probe)
-        chain = Chain(rig, self.placed(vector), self.memory, probe)
+        given, shift = self.rig(vector), float(vector[own])
+        chain = Chain(self._aligned(given, shift, probe), self.placed(vector), self.memory, probe)
         gauges, off, begun, zeros, stood = self._parted(vector[own + 1 : self.head])
         run = self._begun(stood, probe)
-        x = self._entered(float(vector[own]), off, probe)
+        x = self._entered(shift, off, probe)
         with np.errstate(over="ignore", invalid="ignore"):
             made = chain.run(x, segment.stages[0], segment.stages[-1], run, segment.between)
-        if self._enters and is_ahead(self.nominals.rig, self._enters, vector[own] * run.h):
+        if self._enters and is_ahead(given, self._enters, shift * run.h):
             made = sooner(made, run.rest)
         made = self._read(made if segment.readings is None else made[segment.readings], *gauges)
         made = made + self._kept("loose", begun, segment.loose.__matmul__, probe) if begun.any() else made
