@@ -26,6 +26,7 @@ from focgen.rig.modes import (
     fractional_lag,
     hold,
     respond,
+    seen_share,
     settled,
     speeded,
     swings,
@@ -149,9 +150,9 @@ def _between(
     lag, longest = single_lag(transfer), about_as_long(duration)
     if lag:
         gain, T, alpha = lag
-        modes = fractional_lag(T, alpha, h, longest)
+        modes = fractional_lag(T, alpha, h * seen_share(share), longest)
         return gain * settled(between(x, rest, h, modes, share, held), x, rest, 1.0 - modes.gain)
-    modes = modes_of(transfer, h, longest)
+    modes = modes_of(transfer, h * seen_share(share), longest)
     return settled(between(x, rest, h, modes, share, held), x, rest, _missing(transfer, modes))
 
 

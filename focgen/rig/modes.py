@@ -27,6 +27,7 @@ from focgen.rig.dynamics import UNCHANGED, Dynamics
 SPACING = 0.8  # Δ in ln ξ; the rule's own error is about exp(−π²/Δ) = 4e-6
 QUICK = 300.0  # of a sample: faster modes pass at once, which is off by their share over that
 _LARGEST = 300.0  # of an exponent
+_SHORTEST = -12  # power of two: a share of a sample that is as good as none
 _SLOW = 1e-4  # of a mode's decay over a sample: below, (e^q − 1)/q loses its digits
 
 
@@ -108,7 +109,7 @@ def respond(
     if delay and dynamics == UNCHANGED:
         whole, part = split_delay(delay, h)
         if part:
-            modes = fractional_lag(T, alpha, h, about_as_long(duration))
+            modes = fractional_lag(T, alpha, h * seen_share(1.0 - part), about_as_long(duration))
             made = settled(between(x, rest, h, modes, 1.0 - part, held), x, rest, 1.0 - modes.gain)
             return shifted(made, rest, whole)
     if delay:
@@ -122,6 +123,12 @@ def respond(
         borne = dynamics.place, dynamics.stiffness, *dynamics.drag.held
         made = kernels.modes(x, rest, a, b0, b1, pair, through, switching, *borne, held)
     return settled(made, x, rest, 1.0 - fractional_lag(T, alpha, h, longest).gain)
+
+
+def seen_share(share: float) -> float:
+    """The part of a sample that modes have to be made for, where a response is asked at this ``share`` of
+    one: the whole, unless modes that pass at once would show there; then a power of two, which fits share."""
+    return min(1.0, 32.0 * 2.0 ** max(math.floor(math.log2(max(share, 1e-300))), _SHORTEST))
 
 
 def about_as_long(duration: float) -> float:

@@ -12,13 +12,13 @@ import pytest
 
 from focgen.diagnosis.diagnose import diagnose
 from focgen.diagnosis.hypotheses.nuisances import problem_of
-from focgen.diagnosis.problem.aligned import first_of_whole_orders, sooner
+from focgen.diagnosis.problem.aligned import first_that_takes_time, sooner
 from focgen.diagnosis.problem.segments import make
 from focgen.fractional.simulation import Convolution
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
-from focgen.rig.rig import Actuator, Delays, LinearActuator, Rig, Signals
+from focgen.rig.rig import Actuator, Delays, Rig, Signals
 from tests.identification.test_out_of_step import FINE, GAIN, TAU, H, T, lag, moved, steps
 
 PLANT = TransferFunction([(1.0, 0.0)], [(T, 0.8), (1.0, 0.0)])
@@ -88,17 +88,16 @@ def test_what_is_there_is_found_beside_it():
     assert found.causes[0].candidates[0].confidence > 0.5
 
 
-def test_only_a_staircase_into_whole_orders_is_moved_by_a_dead_time():
-    """What rises by t^α has no slope where it jumps, by which a fit could go."""
+def test_only_a_staircase_is_moved_by_a_dead_time():
     stages = ("regulator", "actuator", "sensor")
-    assert first_of_whole_orders(RIG, stages) == "regulator"
-    assert first_of_whole_orders(RIG, stages[1:]) is None
-    assert first_of_whole_orders(replace(RIG, actuator=LinearActuator(REGULATOR)), stages[1:]) == "actuator"
+    assert first_that_takes_time(RIG, stages) == "regulator"
+    assert first_that_takes_time(RIG, stages[1:]) == "actuator"
+    assert first_that_takes_time(replace(RIG, actuator=None), stages[1:]) is None
     smooth = [replace(log, signals={**log.signals, "command": np.sin(log.time)}) for log in logs_of(0.0, 0.0)]
     problem = problem_of(RIG, make(smooth, "command", "output").anew(between=Between.HELD), smooth)
     assert problem.lead == problem.slack
 
 
 def test_each_experiment_is_sooner_by_itself():
-    y, rest = np.array([0.0, 1.0, 4.0, 10.0, 20.0]), np.array([1, 0, 0, 2, 0], np.uint8)
-    np.testing.assert_allclose(sooner(y, rest), [1.0, 4.0, 7.0, 20.0, 30.0])
+    made, rest = np.array([0.0, 1.0, 4.0, 10.0, 20.0]), np.array([1, 0, 0, 2, 0], np.uint8)
+    np.testing.assert_allclose(sooner(made, rest), [1.0, 4.0, 4.0, 20.0, 20.0])

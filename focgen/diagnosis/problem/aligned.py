@@ -14,24 +14,18 @@ from dataclasses import replace
 import numpy as np
 
 from focgen.arrays import Array, Bytes
-from focgen.fractional.transfer import TransferFunction
 from focgen.rig.rig import UNITY, Rig
 
 
-def first_of_whole_orders(rig: Rig, stages: Sequence[str]) -> str | None:
-    """Of the ``stages`` the first that takes time, if its orders are whole; None where they are not, or all
-    answer at once. What rises by t^α has no slope at a jump, and a simulation by modes no share of it that is
-    much less than a sample's: there a mean of two staircases is as good."""
-    for stage in stages:
-        if (transfer := _transfer_of(rig, stage)) != UNITY:
-            return stage if transfer.is_integer else None
-    return None
+def first_that_takes_time(rig: Rig, stages: Sequence[str]) -> str | None:
+    """Of the ``stages``; None where all of them answer at once."""
+    return next((stage for stage in stages if _takes_time(rig, stage)), None)
 
 
-def _transfer_of(rig: Rig, stage: str) -> TransferFunction:
-    made: TransferFunction = (
-        getattr(rig.actuator, "dynamics", UNITY) if stage == "actuator" else getattr(rig, stage)
-    )
+def _takes_time(rig: Rig, stage: str) -> bool:
+    if stage == "actuator":
+        return getattr(rig.actuator, "dynamics", UNITY) != UNITY
+    made: bool = getattr(rig, stage) != UNITY
     return made
 
 
@@ -49,7 +43,6 @@ def later(rig: Rig, stage: str, late: float, h: float) -> Rig:
     return replace(rig, delays=replace(rig.delays, **{stage: delay + h * (delay < 0.0)}))
 
 
-def sooner(y: Array, rest: Bytes) -> Array:
-    """``y`` (n,) a sample sooner, experiments apart, each of which goes on at its end as it did."""
-    last = np.r_[rest[1:], 1] > 0
-    return np.where(last, 2.0 * y - np.roll(y, 1), np.roll(y, -1))
+def sooner(made: Array, rest: Bytes) -> Array:
+    """What was ``made`` (n,) a sample sooner, experiments apart, each at its end as it was a sample before."""
+    return np.where(np.r_[rest[1:], 1] > 0, made, np.roll(made, -1))

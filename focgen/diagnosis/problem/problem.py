@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from focgen.diagnosis.problem.aligned import first_of_whole_orders, is_ahead, later, sooner
+from focgen.diagnosis.problem.aligned import first_that_takes_time, is_ahead, later, sooner
 from focgen.diagnosis.problem.candidates import CandidateEffect, References
 from focgen.diagnosis.problem.excitation import excitation
 from focgen.diagnosis.problem.free import gain_freedom
@@ -237,7 +237,7 @@ class Problem:
         """The stage whose dead time says how far columns are out of step, where a part of a sample shows: the
         input is a staircase, by which the output may be early."""
         stair = self.lead > self.slack and self.segment.fed.between == Between.HELD
-        return first_of_whole_orders(self.nominals.rig, self.segment.stages) if stair else None
+        return first_that_takes_time(self.nominals.rig, self.segment.stages) if stair else None
 
     def _aligned(self, rig: Rig, shift: float, probe: bool) -> Rig:
         """``rig`` with the output ``shift`` samples later; the same object where it is as lately."""
@@ -379,8 +379,10 @@ class Problem:
         return made
 
     def residual(self, vector: np.ndarray) -> np.ndarray:
-        """Measured less simulated (n,), in the log's units; where the rig integrates, the recent part."""
-        return self.segment.recent(self.segment.y - self.simulate(vector))
+        """Measured less simulated (n,), in the log's units; where the rig integrates, the recent part. Of a
+        staircase 0 at the end of each experiment, behind which nothing was simulated."""
+        left = self.segment.recent(self.segment.y - self.simulate(vector))
+        return left * (self.segment.trust > 0.0) if self._enters else left
 
     def weighed(self, vector: np.ndarray) -> np.ndarray:
         """The residual (n,) as a share of the output's level, each sample by its trust."""
