@@ -44,9 +44,9 @@ def early_told(lead: float, step: float, signal: str) -> tuple[str, ...]:
         return ()
     if lead < 0.0:
         what = f"{-lead:.2g} s ({-lead / step:.2g} samples) behind its command: columns out of step, it seems"
-        return (f"the {signal} answers {what}, and not written; give --delay where it is a dead time",)
+        return (f"the {signal} answers {what}, and written as a lead; give --delay where it is a dead time",)
     what = f"{lead:.2g} s ({lead / step:.2g} samples) ahead of its command, as no rig does"
-    why = "its rows have a command beside what was read later. The rig is written without that"
+    why = "its rows have a command beside what was read later; written as lead in [signals]"
     return (f"the {signal} answers {what}: {why}",)
 
 

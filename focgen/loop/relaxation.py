@@ -11,7 +11,7 @@ went in are, bit for bit, those of the loop stepped sample by sample.
 from __future__ import annotations
 
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -75,7 +75,8 @@ class Plant:
         tap: dict[str, Array] = {}
         turn = turn_of(self.rig)
         x = turn.signs["command"] * x
-        Chain(turn.rig(self.rig), self.placed).run(x, "regulator", "sensor", run, held, tap)
+        rig = replace(turn.rig(self.rig), lead=0.0)  # of logs, where there are none
+        Chain(rig, self.placed).run(x, "regulator", "sensor", run, held, tap)
         made = turn.back.signals({LEAVES[stage]: y for stage, y in tap.items()})
         return {role: y[self.lead * self.parts :] for role, y in made.items()}
 

@@ -10,13 +10,14 @@ import numpy as np
 from focgen.arrays import Array
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
-from focgen.rig import chamber, lags, linear, solved, uneven
+from focgen.rig import lags, linear, solved
 from focgen.rig import plant as plants
+from focgen.rig.ahead import in_step, longer
 from focgen.rig.begun import from_there, past_of, with_past
 from focgen.rig.changeable import IN_STEPS
 from focgen.rig.courses import sharpened
 from focgen.rig.delay import centred, delayed
-from focgen.rig.dynamics import FREE, SAME, STEADY, UNCHANGED, Dynamics, Lever, Pace
+from focgen.rig.dynamics import FREE, SAME, STEADY, UNCHANGED, Dynamics, Lever
 from focgen.rig.effects import EQUATIONS, Run
 from focgen.rig.finer import at_samples, finer, parts_of
 from focgen.rig.lever import levered
@@ -24,9 +25,8 @@ from focgen.rig.modes import respond
 from focgen.rig.placed import EARLY, LAST, LATE, Placed
 from focgen.rig.rig import UNITY, Actuator, LinearActuator, Rig
 from focgen.rig.stages import STAGES
+from focgen.rig.steps import Step, chamber_step, fed_step, linear_step, uneven_step
 from focgen.rig.weak import can_be_solved, solved_weak, weakened
-
-Step = tuple[tuple[Hashable, ...], Callable[[Array, Run], Array], Placed | None]
 
 
 @dataclass
@@ -66,12 +66,36 @@ class Chain:
             left[:] = [{} for _ in self.placed]
         if run.begins:
             return self._begun(x, first, last, run, between, tap, left)
+        if self.rig.lead and between == Between.HELD and first == "regulator":
+            return self._ahead(x, first, last, run, tap, left)
         parts = parts_of(self.rig, first, last, run.h) if between == Between.HELD else 1
         if parts > 1:
             x = self._once("parts", parts, x, lambda x, run: np.repeat(x, parts), run)
             y = self._run(x, first, last, finer(run, parts), between, tap, left)
             return at_samples(y, tap, parts)
         return self._run(x, first, last, run, between, tap, left)
+
+    def _ahead(
+        self,
+        x: Array,
+        first: str,
+        last: str,
+        run: Run,
+        tap: dict[str, Array] | None,
+        left: list[dict[str, float]] | None,
+    ) -> Array:
+        """The same of a command that was sent ahead of its rows."""
+        rig, count = in_step(self.rig, first, last, run.h)
+        chain = Chain(replace(rig, known=()), self.placed, self.remember, self.probe)
+        if not count:
+            return chain.run(x, first, last, run, Between.HELD, tap, left)
+        long = longer(run, count)
+        x = self._once("longer", count, x, lambda x, run: x[long.rows], run)
+        made = chain.run(x, first, last, long.run, Between.HELD, tap, left)
+        if tap is not None:
+            tap.update({stage: y[long.kept] for stage, y in tap.items()})
+        found: Array = made[long.kept]
+        return found
 
     def _run(
         self,
@@ -175,11 +199,11 @@ class Chain:
             return _actuator(self.rig.actuator, here, between, delay)
         transfer, dynamics = getattr(self.rig, stage), _dynamics(here)
         if dynamics.pace != STEADY:
-            return [_uneven(transfer, dynamics.pace, between, delay)]
-        fed = [_fed(transfer, dynamics.supply)] if np.isfinite(dynamics.supply) else []
+            return [uneven_step(transfer, dynamics.pace, between, delay)]
+        fed = [fed_step(transfer, dynamics.supply)] if np.isfinite(dynamics.supply) else []
         if dynamics.changed - {"supply"}:
-            return [*fed, _chamber(transfer, dynamics, between, delay)]
-        return fed if transfer == UNITY and not delay else [*fed, _transfer(transfer, between, delay)]
+            return [*fed, chamber_step(transfer, dynamics, between, delay)]
+        return fed if transfer == UNITY and not delay else [*fed, linear_step(transfer, between, delay)]
 
 
 def between_of(rig: Rig, entry: str) -> Between:
@@ -203,14 +227,6 @@ def _index(placed: Sequence[Placed], one: Placed) -> int:
     return next(i for i, p in enumerate(placed) if p is one)
 
 
-def _transfer(transfer: TransferFunction, between: Between | bool, delay: float) -> Step:
-    return (
-        (transfer, between, delay),
-        lambda x, run: linear.run(transfer, x, run.rest, run.h, run.duration, between, delay),
-        None,
-    )
-
-
 def _dynamics(here: Sequence[Placed]) -> Dynamics:
     """What effects of a stage change of its own equation."""
     dynamics = UNCHANGED
@@ -220,39 +236,19 @@ def _dynamics(here: Sequence[Placed]) -> Dynamics:
     return dynamics
 
 
-def _fed(transfer: TransferFunction, supply: float) -> Step:
-    return ("fed", transfer, supply), lambda x, run: chamber.asked(transfer, x, supply), None
-
-
-def _uneven(transfer: TransferFunction, pace: Pace, between: Between | bool, delay: float) -> Step:
-    return (
-        (transfer, pace, between, delay),
-        lambda x, run: uneven.run(transfer, x, run, pace, between, delay),
-        None,
-    )
-
-
-def _chamber(transfer: TransferFunction, own: Dynamics, between: Between | bool, delay: float) -> Step:
-    return (
-        (transfer, own, between, delay),
-        lambda x, run: chamber.run(transfer, x, run.rest, run.h, own, between, delay),
-        None,
-    )
-
-
 def _actuator(
     actuator: Actuator | LinearActuator | None, here: Sequence[Placed], between: Between | bool, delay: float
 ) -> list[Step]:
     drive = [_effect(p) for p in here if p.slot == "drive"]
     if actuator is None:
-        return [*drive, _transfer(UNITY, between, delay)] if delay else drive
+        return [*drive, linear_step(UNITY, between, delay)] if delay else drive
     weak = [p for p in here if p.slot == "spring"]
     dynamics = _dynamics(here)
     if dynamics.pace != STEADY:
         ahead = (("zero", actuator), lambda x, run: actuator.drive(x), None)
-        return [ahead, *drive, _uneven(actuator.dynamics, dynamics.pace, between, delay)]
+        return [ahead, *drive, uneven_step(actuator.dynamics, dynamics.pace, between, delay)]
     if (weak or dynamics.lever != SAME) and delay:  # what is late is what drives it
-        return [*_actuator(actuator, here, between, 0.0), _transfer(UNITY, Between.STRAIGHT, delay)]
+        return [*_actuator(actuator, here, between, 0.0), linear_step(UNITY, Between.STRAIGHT, delay)]
     lever, dynamics = dynamics.lever, dynamics.without("lever")
     if isinstance(actuator, LinearActuator):
         zero = [(("bias", actuator.bias), lambda x, run: actuator.drive(x), None)] if actuator.bias else []
@@ -298,7 +294,7 @@ def _linear(
     actuator: LinearActuator, dynamics: Dynamics, between: Between | bool, delay: float
 ) -> list[Step]:
     if dynamics == UNCHANGED:
-        return [_transfer(actuator.dynamics, between, delay)]
+        return [linear_step(actuator.dynamics, between, delay)]
     if dynamics.flow != FREE:
         return _choked(actuator, dynamics, between, delay)
     if swung := _swung(actuator.dynamics, dynamics, between, delay):
@@ -322,8 +318,8 @@ def _choked(
     """With a highest rate: in the equation of a lag of order 1, beside other changes of that behind it."""
     others = dynamics.without("flow")
     if others.changed <= {"loading", "unloading"}:
-        return [_chamber(actuator.dynamics, dynamics, between, delay)]
-    behind = _chamber(_AT_ONCE, Dynamics(flow=dynamics.flow), Between.STRAIGHT, 0.0)
+        return [chamber_step(actuator.dynamics, dynamics, between, delay)]
+    behind = chamber_step(_AT_ONCE, Dynamics(flow=dynamics.flow), Between.STRAIGHT, 0.0)
     return [*_linear(actuator, others, between, delay), behind]
 
 
@@ -336,7 +332,7 @@ def _swung(of: TransferFunction, dynamics: Dynamics, between: Between | bool, de
     if light == UNCHANGED or (of.is_integer and light.changed <= _OF_PLANTS):
         return _linear(LinearActuator(_heavier(of, dynamics.mass)), light, between, delay)
     swing = TransferFunction(of.den, _heavier(of, dynamics.mass).den)
-    return [*_linear(LinearActuator(of), light, between, delay), _transfer(swing, Between.STRAIGHT, 0.0)]
+    return [*_linear(LinearActuator(of), light, between, delay), linear_step(swing, Between.STRAIGHT, 0.0)]
 
 
 def _heavier(of: TransferFunction, mass: float) -> TransferFunction:

@@ -38,6 +38,7 @@ LEAST_ORDER = 0.01
 """The least order of s that a stage of a rig may have beside 0."""
 _LONGEST = 1e6  # samples that a nominal delay may have
 _WHICH = "say which log column plays which role"
+_FARTHEST = 4  # samples that a command may be ahead of its row
 
 
 def read_rig(path: str | Path | Mapping[str, Any]) -> Rig:
@@ -64,6 +65,7 @@ def read_rig(path: str | Path | Mapping[str, Any]) -> Rig:
         delays=delays,
         uncertainty=_uncertainty(top.table("uncertainty")),
         between=_between(top.section("signals", _WHICH)),
+        lead=_lead(top.section("signals", _WHICH), top),
         downwards=_downwards(top.section("signals", _WHICH)),
         origins=_origins(top.section("signals", _WHICH)),
     )
@@ -79,8 +81,7 @@ def _signals(top: Table) -> Signals:
         table.required(role)
     named = {role: _column(table, role) for role in _ROLES}
     found = {role: column for role, (column, _) in named.items()} | {"run": table.text("run")}
-    table.text("between")
-    for key in ("downwards", "origins"):
+    for key in ("between", "lead", "downwards", "origins"):
         table.raw(key)
     table.done()
     if found["command"] is None and found["pressure"] is None:
@@ -107,6 +108,15 @@ def _between(table: Table) -> Between | None:
         known = ", ".join(repr(way.name.lower()) for way in Between)
         raise table.fail("between", f"is {word!r}", f"give one of {known}, or leave it to the logs")
     return Between[word.upper()]
+
+
+def _lead(table: Table, top: Table) -> float:
+    """By how many s a command was sent ahead of its row."""
+    lead = table.number("lead", 0.0)
+    if abs(lead) > _FARTHEST * top.number("sample_time", 0.0):
+        what = f"is {lead:g} s, over {_FARTHEST} samples"
+        raise table.fail("lead", what, "put the command into the rows in which it acts")
+    return lead
 
 
 def _downwards(table: Table) -> frozenset[str]:
@@ -350,6 +360,7 @@ def _bounds_table(rig: Rig) -> dict[str, Any]:
 def _input_table(rig: Rig) -> dict[str, Any]:
     """What the file says of the rig's input, where it says something."""
     table: dict[str, Any] = {} if rig.between is None else {"between": rig.between.name.lower()}
+    table |= {"lead": rig.lead} if rig.lead else {}
     if rig.downwards:
         table["downwards"] = [r for r in ROLES if r in rig.downwards]
     if rig.origins:

@@ -185,8 +185,9 @@ class Origins:
 @dataclass(frozen=True)
 class Rig:
     """The nominal rig. ``sample_time`` in s; ``effects`` are the ``[[effects]]`` tables as read; ``between``:
-    what its first input does from one sample to the next, None where logs are to tell. ``zero``: what is
-    added to the sensor's reading, in the output's unit. ``downwards``: the roles whose signals effects count
+    what its first input does from one sample to the next, None where logs are to tell. ``lead``: by how many
+    s a held command was sent ahead of its row in the logs, less than 0 where behind. ``zero``: what is added
+    to the sensor's reading, in the output's unit. ``downwards``: the roles whose signals effects count
     downwards, and ``origins``, where they count them from. Of no file are ``known``, effects
     (:class:`focgen.rig.placed.Placed`) that are run wherever the rig is, as its numbers are. Nor are
     ``turned`` and ``moved``: what ``downwards`` and ``origins`` were of a rig whose signals are turned and
@@ -203,6 +204,7 @@ class Rig:
     delays: Delays = Delays()
     uncertainty: Uncertainty = Uncertainty()
     between: Between | None = None
+    lead: float = 0.0
     zero: float = 0.0
     downwards: frozenset[str] = frozenset()
     origins: Origins = Origins()

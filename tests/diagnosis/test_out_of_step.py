@@ -12,7 +12,6 @@ import pytest
 
 from focgen.diagnosis.diagnose import diagnose
 from focgen.diagnosis.hypotheses.nuisances import problem_of
-from focgen.diagnosis.problem.aligned import first_that_takes_time, sooner
 from focgen.diagnosis.problem.segments import make
 from focgen.fractional.simulation import Convolution
 from focgen.fractional.transfer import TransferFunction
@@ -46,8 +45,7 @@ def test_a_staircase_out_of_step_is_simulated_as_it_was(lead):
     vector[len(problem.nominal_start)] = -lead
     low, high = problem.bounds()
     assert np.all(low <= vector) and np.all(vector <= high)
-    left = problem.residual(vector) * (problem.segment.trust > 0.0)
-    assert np.sum(problem.segment.trust == 0.0) == 2  # what comes behind the last samples is guessed
+    left = problem.residual(vector)
     assert np.max(np.abs(left)) < 2e-3 * np.ptp(problem.segment.y)
 
 
@@ -71,7 +69,7 @@ def test_a_dead_time_that_was_refitted_makes_no_jump_where_columns_meet():
         made = []
         for shift in (-meet - 1e-3, -meet + 1e-3, -0.499, -0.501):
             vector[place] = shift
-            made.append(problem.simulate(vector) * (problem.segment.trust > 0.0))
+            made.append(problem.simulate(vector))
         for one, other in (made[:2], made[2:]):
             assert np.max(np.abs(one - other)) < 0.005 * np.ptp(one)
 
@@ -88,16 +86,9 @@ def test_what_is_there_is_found_beside_it():
     assert found.causes[0].candidates[0].confidence > 0.5
 
 
-def test_only_a_staircase_is_moved_by_a_dead_time():
-    stages = ("regulator", "actuator", "sensor")
-    assert first_that_takes_time(RIG, stages) == "regulator"
-    assert first_that_takes_time(RIG, stages[1:]) == "actuator"
-    assert first_that_takes_time(replace(RIG, actuator=None), stages[1:]) is None
-    smooth = [replace(log, signals={**log.signals, "command": np.sin(log.time)}) for log in logs_of(0.0, 0.0)]
-    problem = problem_of(RIG, make(smooth, "command", "output").anew(between=Between.HELD), smooth)
-    assert problem.lead == problem.slack
-
-
-def test_each_experiment_is_sooner_by_itself():
-    made, rest = np.array([0.0, 1.0, 4.0, 10.0, 20.0]), np.array([1, 0, 0, 2, 0], np.uint8)
-    np.testing.assert_allclose(sooner(made, rest), [1.0, 4.0, 4.0, 20.0, 20.0])
+def test_only_a_staircase_of_commands_is_ahead_of_its_rows():
+    logs = logs_of(0.0, 0.0)
+    smooth = [replace(log, signals={**log.signals, "command": np.sin(log.time)}) for log in logs]
+    for log, ahead in ((smooth, False), (logs, True)):
+        problem = problem_of(RIG, make(log, "command", "output").anew(between=Between.HELD), log)
+        assert (problem.lead > problem.slack) == ahead

@@ -50,17 +50,10 @@ def problem_of(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Proble
     segment = replace(segment, pace=pace(rig, segment.stages, scales.clocks["response"]))
     least = _HALF if any(map(_jumps, segment.fed.parts(segment.fed.x))) else 0.0
     slack = float(np.clip(_OUT_OF_STEP * scales.clocks["response"] / segment.fed.run.h, least, 1.0))
-    lead = slack
-    if least and slack < 1.0 and segment.between == Between.HELD:
-        lead, segment = 1.0, segment.seen_at(_but_last(segment))  # what comes behind the last is guessed
+    stair = least and segment.entry == "command" and segment.between == Between.HELD
+    lead = 1.0 if stair else slack
     own = NominalParameters(rig, segment.stages, freely, load, response)
     return Problem(segment, own, scales, slack=slack, lead=lead)
-
-
-def _but_last(segment: Segment) -> np.ndarray:
-    """All readings (n,) but the last of each experiment."""
-    kept: np.ndarray = np.r_[segment.run.rest[1:], 1] == 0
-    return kept
 
 
 def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:

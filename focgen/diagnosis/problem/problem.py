@@ -10,7 +10,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from focgen.diagnosis.problem.aligned import first_that_takes_time, is_ahead, later, sooner
 from focgen.diagnosis.problem.candidates import CandidateEffect, References
 from focgen.diagnosis.problem.excitation import excitation
 from focgen.diagnosis.problem.free import gain_freedom
@@ -232,19 +231,16 @@ class Problem:
         values, given = vector[: len(self.nominal_start)], self.nominals.rig
         return self._lately("rigs", values.tobytes(), given, partial(self.nominals.put, given, values))
 
-    @cached_property
-    def _enters(self) -> str | None:
-        """The stage whose dead time says how far columns are out of step, where a part of a sample shows: the
-        input is a staircase, by which the output may be early."""
-        stair = self.lead > self.slack and self.segment.fed.between == Between.HELD
-        return first_that_takes_time(self.nominals.rig, self.segment.stages) if stair else None
+    @property
+    def _is_staircase(self) -> bool:
+        """Whether a part of a sample shows that columns are out of step by: the input jumps and rests."""
+        return self.lead > self.slack and self.segment.fed.between == Between.HELD
 
-    def _aligned(self, rig: Rig, shift: float, probe: bool) -> Rig:
-        """``rig`` with the output ``shift`` samples later; the same object where it is as lately."""
-        stage, h = self._enters, self.segment.fed.run.h
-        if stage is None or not shift:
-            return rig
-        return self._lately("aligned", shift, rig, partial(later, rig, stage, shift * h, h), probe)
+    def rig_of_logs(self, vector: np.ndarray) -> Rig:
+        """The rig, with its command as far ahead of its rows as the vector says."""
+        rig = self.rig(vector)
+        shift = float(vector[len(self.nominal_start)]) if self._is_staircase else 0.0
+        return replace(rig, lead=rig.lead - shift * self.segment.fed.run.h) if shift else rig
 
     def placed(self, vector: np.ndarray) -> tuple[Placed, ...]:
         """The candidate effects as effects of a chain."""
@@ -257,15 +253,13 @@ class Problem:
         follow, which go on from another vector. A plant that runs away with these numbers leaves no finite
         ones, which no fit takes: that is no fault to warn of."""
         own, segment = len(self.nominal_start), self.segment
-        given, shift = self.rig(vector), float(vector[own])
-        chain = Chain(self._aligned(given, shift, probe), self.placed(vector), self.memory, probe)
+        shift = float(vector[own])
+        chain = Chain(self.rig_of_logs(vector), self.placed(vector), self.memory, probe)
         gauges, off, begun, zeros, stood = self._parted(vector[own + 1 : self.head])
         run = self._begun(stood, probe)
         x = self._entered(shift, off, probe)
         with np.errstate(over="ignore", invalid="ignore"):
             made = chain.run(x, segment.stages[0], segment.stages[-1], run, segment.between)
-        if self._enters and is_ahead(given, self._enters, shift * run.h):
-            made = sooner(made, run.rest)
         made = self._read(made if segment.readings is None else made[segment.readings], *gauges)
         made = made + self._kept("loose", begun, segment.loose.__matmul__, probe) if begun.any() else made
         return made + self._kept("zeros", zeros, self._uneven, probe) if zeros.any() else made
@@ -352,7 +346,7 @@ class Problem:
     def _entered(self, shift: float, off: np.ndarray, probe: bool) -> np.ndarray:
         """The input, ``shift`` samples out of step and ``off`` in the ways it is unsure; the same array where
         nothing changed, by which a chain remembers what it made of it."""
-        shift = 0.0 if self._enters else shift  # the rig makes it
+        shift = 0.0 if self._is_staircase else shift  # the rig makes it
         key = (shift, *off.tolist())
         if not any(key):
             return self.segment.fed.bent
@@ -379,10 +373,8 @@ class Problem:
         return made
 
     def residual(self, vector: np.ndarray) -> np.ndarray:
-        """Measured less simulated (n,), in the log's units; where the rig integrates, the recent part. Of a
-        staircase 0 at the end of each experiment, behind which nothing was simulated."""
-        left = self.segment.recent(self.segment.y - self.simulate(vector))
-        return left * (self.segment.trust > 0.0) if self._enters else left
+        """Measured less simulated (n,), in the log's units; where the rig integrates, the recent part."""
+        return self.segment.recent(self.segment.y - self.simulate(vector))
 
     def weighed(self, vector: np.ndarray) -> np.ndarray:
         """The residual (n,) as a share of the output's level, each sample by its trust."""

@@ -99,7 +99,7 @@ def _closest(
     """The rig with the nominal parameters of all ``fits`` where that brings the output closer, else of those
     that bring it closest; each with the zero that the ``last`` segment's readings have.
     """
-    fits = [f for f in fits if len(f.problem.nominal_start)]
+    fits = [f for f in fits if len(f.problem.nominal_start) or f.problem.segment.entry == "command"]
 
     def moved(part: Sequence[Fit]) -> Rig:
         return _with_zero(_moved(rig, part), last, placed, logs)
@@ -113,7 +113,9 @@ def _closest(
 
 def _moved(rig: Rig, fits: Sequence[Fit]) -> Rig:
     for f in fits:
+        lead = f.problem.rig_of_logs(f.vector).lead
         rig = f.problem.nominals.put(rig, f.vector[: len(f.problem.nominal_start)])
+        rig = replace(rig, lead=lead) if f.problem.segment.entry == "command" else rig
     return rig
 
 
