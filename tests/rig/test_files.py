@@ -128,3 +128,14 @@ def test_faults_name_where_what_and_remedy(tmp_path, fault):
 def test_missing_file_is_reported():
     with pytest.raises(RigError, match="cannot be read"):
         read_rig("nowhere.toml")
+
+
+def test_a_lead_is_written_and_read(tmp_path):
+    path, led = tmp_path / "rig.toml", RIG.replace('output = "kappa"', 'output = "kappa"\nlead = 0.0123')
+    path.write_text(led)
+    assert read_rig(path).lead == 0.0123
+    write_rig(read_rig(path), tmp_path / "again.toml")
+    assert read_rig(tmp_path / "again.toml").lead == 0.0123
+    path.write_text(led.replace("0.0123", "0.05"))
+    with pytest.raises(RigError, match="over 4 samples"):
+        read_rig(path)

@@ -23,6 +23,7 @@ from focgen.rig.rig import Rig
 from focgen.rig.session import entering, entry_of, run_of
 
 _SHOWN = 1e-3  # of the output's level: less of a zero shows in no reading
+_STEP = 0.02  # samples: less out of step is none
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,10 +114,15 @@ def _closest(
 
 def _moved(rig: Rig, fits: Sequence[Fit]) -> Rig:
     for f in fits:
-        lead = f.problem.rig_of_logs(f.vector).lead
-        rig = f.problem.nominals.put(rig, f.vector[: len(f.problem.nominal_start)])
-        rig = replace(rig, lead=lead) if f.problem.segment.entry == "command" else rig
+        rig = _with_lead(f.problem.nominals.put(rig, f.vector[: len(f.problem.nominal_start)]), f)
     return rig
+
+
+def _with_lead(rig: Rig, of: Fit) -> Rig:
+    """The rig with what its command is ahead of its rows by, where that is another than it says."""
+    lead, step = float(f"{of.problem.rig_of_logs(of.vector).lead:.3g}"), of.problem.segment.fed.run.h
+    tells = of.problem.segment.entry == "command" and abs(lead - rig.lead) > _STEP * step
+    return replace(rig, lead=lead) if tells else rig
 
 
 def gap(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment]) -> float:
