@@ -66,7 +66,7 @@ def found_in(
     """What is found of a session, begun in whatever way the rig tells best. ``only``, ``bootstrap``: as
     :func:`~focgen.diagnosis.diagnose.diagnose` takes them."""
     explanations = explain_all(nominal, session, NUMBERS.nats, only, bootstrap)
-    nominal = explanations[0].with_intersample(nominal, entry_of(session))
+    nominal = explanations[0].of_logs(nominal, entry_of(session))
     search = _Search(nominal, only, bootstrap)
     explanations, session = _rested(search, explanations, session)
     explanations, session = _slow(search, explanations, session)

@@ -98,7 +98,7 @@ def identify(
     check_bounded(replace(nominal, actuator=None), longest(experiments))
     found = {s: identify_stage(experiments, s, nominal.between) for s in stages if s != "actuator"}
     ranges, told = seen_ranges(nominal.ranges, experiments)
-    new = _with_stages(replace(nominal, ranges=ranges, effects=(), lead=0.0), found)
+    new = _with_stages(replace(nominal, ranges=ranges, effects=()), found)
     if "actuator" in stages:
         result = _actuator(experiments, others, new, gain_degree, delay, integer)
     else:
@@ -136,7 +136,9 @@ def _check_unseen(fitted: Sequence[Experiment], shown: Sequence[Experiment]) -> 
 def _with_stages(rig: Rig, found: dict[str, StageFit]) -> Rig:
     """The rig with its regulator and sensor as identified."""
     delays = replace(rig.delays, **{name: fit.delay for name, fit in found.items()})
-    lead = _told_lead(sum(fit.parameters.get("lead", (0.0, 0.0))[0] for fit in found.values()))
+    lead = rig.lead
+    if "regulator" in found:  # whose command shows it
+        lead = _told_lead(found["regulator"].parameters.get("lead", (0.0, 0.0))[0])
     transfers: dict[str, Any] = {name: fit.transfer for name, fit in found.items()}
     known = with_stages(rig.uncertainty, found)
     rig = replace(rig, delays=delays, uncertainty=known, lead=lead, **transfers)
@@ -177,7 +179,7 @@ def _actuator(
         actuator=actuator,
         zero=zero if of_sensor else rig.zero,
         delays=replace(rig.delays, actuator=joint.delay),
-        lead=_told_lead(joined.lead) or rig.lead,
+        lead=_told_lead(joined.lead) if excitations[0].input_role == "command" else rig.lead,
         uncertainty=replace(rig.uncertainty, actuator=known),
     )
     joint = _as_written(joint, joined, actuator)

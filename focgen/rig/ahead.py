@@ -18,20 +18,24 @@ from focgen.rig.effects import Run
 from focgen.rig.rig import UNITY, Rig
 from focgen.rig.stages import STAGES
 
+FARTHEST = 4  # samples that a command may be ahead of its row: more is another row's
 _ROUNDING = 1e-9  # samples
 
 
-def in_step(rig: Rig, first: str, last: str, h: float) -> tuple[Rig, int]:
+def in_step(rig: Rig, first: str, last: str, h: float) -> tuple[Rig, int, dict[str, int]]:
     """The rig of a command that is not ahead, from stage ``first`` to ``last``, and how many samples of ``h``
-    s sooner what leaves it comes."""
+    s sooner what leaves it comes; by stage, how many of these are too many for what answers at once: its own
+    row's command, or one that was ahead by a sample or more."""
     stages = STAGES[STAGES.index(first) : STAGES.index(last) + 1]
     stage = next((stage for stage in stages if _takes_time(rig, stage)), None)
     if stage is None:
-        return replace(rig, lead=0.0), 0
+        return replace(rig, lead=0.0), 0, {}
     late = getattr(rig.delays, stage) - rig.lead
     count = max(math.ceil(-late / h - _ROUNDING), 0)
     delays = replace(rig.delays, **{stage: max(late + count * h, 0.0)})
-    return replace(rig, lead=0.0, delays=delays), count
+    whole = math.floor(rig.lead / h + _ROUNDING)
+    at_once = dict.fromkeys(stages[: stages.index(stage)], count - whole)
+    return replace(rig, lead=0.0, delays=delays), count, at_once
 
 
 def _takes_time(rig: Rig, stage: str) -> bool:
@@ -71,6 +75,7 @@ def _made_longer(run: Run, count: int) -> Longer:
     rest = np.where(more > 0, 0, run.rest[rows]).astype(np.uint8)
     there = np.append(np.arange(len(run.rest)) + ahead, len(rows))
     guessed = tuple((int(there[first]), int(there[last - 1]) + 1) for first, last in run.guessed)
-    long = replace(run, rest=rest, clock=run.clock[rows] + run.h * more, guessed=guessed)
+    clock = run.clock[rows] + run.h * (more - count)  # what is made there is read as many rows later
+    long = replace(run, rest=rest, clock=clock, guessed=guessed)
     long = replace(long, duration=run.duration + count * run.h)
     return Longer(long, rows, there[:-1] + count)

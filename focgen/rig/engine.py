@@ -85,7 +85,7 @@ class Chain:
         left: list[dict[str, float]] | None,
     ) -> Array:
         """The same of a command that was sent ahead of its rows."""
-        rig, count = in_step(self.rig, first, last, run.h)
+        rig, count, at_once = in_step(self.rig, first, last, run.h)
         chain = Chain(replace(rig, known=()), self.placed, self.remember, self.probe)
         if not count:
             return chain.run(x, first, last, run, Between.HELD, tap, left)
@@ -93,7 +93,8 @@ class Chain:
         x = self._once("longer", count, x, lambda x, run: x[long.rows], run)
         made = chain.run(x, first, last, long.run, Between.HELD, tap, left)
         if tap is not None:
-            tap.update({stage: y[long.kept] for stage, y in tap.items()})
+            kept = {stage: np.maximum(long.kept - at_once.get(stage, 0), 0) for stage in tap}
+            tap.update({stage: tap[stage][rows] for stage, rows in kept.items()})
         found: Array = made[long.kept]
         return found
 
@@ -208,8 +209,9 @@ class Chain:
 
 def between_of(rig: Rig, entry: str) -> Between:
     """What the input ``entry`` does from one sample to the next: as the rig says, else the command of a
-    regulator is held, as converters do, and what else there is runs in straight lines."""
-    held = entry == "command" and rig.regulator != UNITY
+    regulator, or one ahead of its rows, is held, as converters do, and what else there is runs in straight
+    lines."""
+    held = entry == "command" and (rig.regulator != UNITY or rig.lead != 0.0)
     return (Between.HELD if held else Between.STRAIGHT) if rig.between is None else rig.between
 
 

@@ -18,6 +18,7 @@ from focgen.logs.between import Between
 from focgen.logs.experiment import ROLES
 from focgen.logs.scales import Scale
 from focgen.output import write_file
+from focgen.rig.ahead import FARTHEST
 from focgen.rig.rig import (
     UNITY,
     Actuator,
@@ -38,7 +39,6 @@ LEAST_ORDER = 0.01
 """The least order of s that a stage of a rig may have beside 0."""
 _LONGEST = 1e6  # samples that a nominal delay may have
 _WHICH = "say which log column plays which role"
-_FARTHEST = 4  # samples that a command may be ahead of its row
 
 
 def read_rig(path: str | Path | Mapping[str, Any]) -> Rig:
@@ -113,8 +113,8 @@ def _between(table: Table) -> Between | None:
 def _lead(table: Table, top: Table) -> float:
     """By how many s a command was sent ahead of its row."""
     lead = table.number("lead", 0.0)
-    if abs(lead) > _FARTHEST * top.number("sample_time", 0.0):
-        what = f"is {lead:g} s, over {_FARTHEST} samples"
+    if abs(lead) > FARTHEST * top.number("sample_time", 0.0):
+        what = f"is {lead:g} s, over {FARTHEST} samples"
         raise table.fail("lead", what, "put the command into the rows in which it acts")
     return lead
 

@@ -19,7 +19,7 @@ from focgen.diagnosis.hypotheses.converter import Converter, converter_of
 from focgen.diagnosis.hypotheses.foretelling import foretelling
 from focgen.diagnosis.hypotheses.left import remembers, unleft
 from focgen.diagnosis.hypotheses.longer_path import borne_out, may_show_more, times_as_long
-from focgen.diagnosis.hypotheses.nuisances import may_be_more, uncertain
+from focgen.diagnosis.hypotheses.nuisances import lead_of, may_be_more, uncertain
 from focgen.diagnosis.hypotheses.order import in_their_order
 from focgen.diagnosis.hypotheses.rivals import Beside, Cause, Examined, lack_of, left_out, reexamined
 from focgen.diagnosis.hypotheses.search import Ranking, evidence, rank
@@ -99,11 +99,14 @@ class Explanation:
         """The one stage this segment is, None where stages are merged."""
         return self.segment.stages[0] if len(self.segment.stages) == 1 else None
 
-    def with_intersample(self, rig: Rig, first: str) -> Rig:
-        """``rig`` with what its ``first`` input does between samples, where that is not as usual."""
+    def of_logs(self, rig: Rig, first: str) -> Rig:
+        """``rig`` with what its ``first`` input does between samples, where that is not as usual, and with as
+        much as a command is ahead of its rows."""
         between, entry = self.segment.between, self.segment.entry
-        usual = entry != first or between == between_of(rig, first)
-        return rig if usual else replace(rig, between=Between(between))
+        if entry != first:
+            return rig
+        rig = rig if between == between_of(rig, first) else replace(rig, between=Between(between))
+        return replace(rig, lead=lead_of(self.best) if between == Between.HELD else 0.0)
 
     def kept_by(self, given: Rig, refitted: Rig) -> bool:
         """Whether the refit of its nominal parameters is part of the rig ``refitted``."""

@@ -63,7 +63,7 @@ def slower_by(rig: Rig, stage: str, size: float) -> float:
 
 def _core(rig: Rig, stage: str) -> tuple[Rig, float]:
     """A stage from behind that slot on, without effects, and its gain."""
-    rig = replace(rig, known=(), zero=0.0)
+    rig = replace(rig, known=(), zero=0.0, lead=0.0)
     if stage != "actuator":
         return rig, getattr(rig, stage).dc_gain
     actuator = rig.actuator

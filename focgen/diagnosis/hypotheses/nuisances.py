@@ -29,8 +29,9 @@ from focgen.rig.session import entry_of
 
 # of the rig's response: what columns may be out of step by; more is a delay. A whole sample is the most, and
 # half of one where an input jumps, for a loop may read before it writes, the least. A row may have a command
-# and what was read a sample later: no rig does that, so by as much the output of a staircase may be early
-_OUT_OF_STEP, _HALF = 0.05, 0.5
+# and what was read later: no rig does that, so by two samples the output of a staircase may be early
+_OUT_OF_STEP, _HALF, _AHEAD = 0.05, 0.5, 2
+_STEP = 0.1  # samples: less out of step is what a fit may take up of anything
 _GAUGE = 0.01  # of its reading: by what a gauge may be off without being a fault
 _WAYS = (Between.HELD, Between.STRAIGHT, Between.SMOOTH)  # of a command between its samples
 _SMOOTHER = 0.95  # of the mean square that lines leave: a smooth curve, which takes longer, has to leave less
@@ -51,7 +52,7 @@ def problem_of(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Proble
     least = _HALF if any(map(_jumps, segment.fed.parts(segment.fed.x))) else 0.0
     slack = float(np.clip(_OUT_OF_STEP * scales.clocks["response"] / segment.fed.run.h, least, 1.0))
     stair = least and segment.entry == "command" and segment.between == Between.HELD
-    lead = 1.0 if stair else slack
+    lead = float(_AHEAD) if stair and slack < 1.0 else slack
     own = NominalParameters(rig, segment.stages, freely, load, response)
     return Problem(segment, own, scales, slack=slack, lead=lead)
 
@@ -65,7 +66,8 @@ def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
     if len(problems) == 1:
         return problems[0]
     fits = [fit(p, p.nominal(), WHITE, 6) for p in problems]
-    if segment.answers and (held := _kept_held(fits)):
+    stair = any(p.lead > p.slack for p in problems)
+    if (segment.answers or stair) and (held := _kept_held(fits)):
         return held.problem
     *plain, last = fits
     closest = min(plain, key=lambda f: f.sse)
@@ -77,7 +79,7 @@ def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
 
 def _kept_held(fits: Sequence[Fit]) -> Fit | None:
     """The fit to a held input, unless another leaves far less: what a controller makes of a reading cannot
-    have moved there ahead of it."""
+    have moved there ahead of it, nor does what rests between jumps run in lines, whatever is at fault."""
     held = next((f for f in fits if f.problem.segment.between == Between.HELD), None)
     if held is None or min(f.sse for f in fits) < NUMBERS.unlikely * held.sse:
         return None
@@ -101,6 +103,15 @@ def _about_zero(problem: Problem) -> Problem:
         return problem
     zero = found.vector[len(problem.nominal_start) + 1]
     return replace(problem, zero_within=(min(zero, 0.0) - ZERO, max(zero, 0.0) + ZERO))
+
+
+def lead_of(best: Fit) -> float:
+    """By how many s the command is ahead of its rows: as the rig says, unless a fit has clearly another lead
+    that is none of the ends of where it is looked for."""
+    problem, place, step = best.problem, len(best.problem.nominal_start), best.problem.segment.fed.run.h
+    given, found = problem.nominals.rig.lead, problem.rig_of_logs(best.vector).lead
+    inside = all(abs(best.vector[place] - end[place]) > _STEP for end in problem.bounds())
+    return float(f"{found:.3g}") if inside and abs(found - given) > _STEP * step else given
 
 
 def ways(segment: Segment) -> list[Between]:

@@ -17,6 +17,7 @@ from focgen.diagnosis.problem.held import may_have_held, tells_what_is_held
 from focgen.diagnosis.problem.nominal_parameters import NominalParameters
 from focgen.diagnosis.problem.segments import Segment
 from focgen.logs.between import Between
+from focgen.rig.ahead import FARTHEST
 from focgen.rig.begun import with_stands
 from focgen.rig.effects import Excitation, Parameter, Run, library
 from focgen.rig.engine import Chain
@@ -166,7 +167,7 @@ class Problem:
         ends, (modes, loose) = self.nominals.bounds(), (self.segment.input_modes, self.segment.loose)
         ways = [_OFF] * modes.shape[1] + [_BEGUN] * loose.shape[1]
         zeros = [*[self._drift] * self.zeros, *[_OFF] * self.stood]
-        lead, late = (0.0, 0.0) if self._shifted else (self.lead, self.slack)
+        lead, late = (0.0, 0.0) if self._shifted else self._reach
         others = [*self.gauges, *ways, *zeros]
         low: list[float] = [*ends[0], -lead, *(-b for b in others)]
         high: list[float] = [*ends[1], late, *others]
@@ -179,6 +180,13 @@ class Problem:
             place = len(self.nominal_start) + 1
             low[place], high[place] = self.zero_within
         return np.array(low, float), np.array(high, float)
+
+    @property
+    def _reach(self) -> tuple[float, float]:
+        """By how many samples the output may be earlier and later than the rig says: as early as a file may
+        say, and as late as a rig that says nothing."""
+        said = self.nominals.rig.lead / self.segment.fed.run.h if self._is_staircase else 0.0
+        return min(self.lead, max(FARTHEST - said, 0.0)), self.slack + max(said, 0.0)
 
     @property
     def _drift(self) -> float:

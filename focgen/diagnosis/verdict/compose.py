@@ -23,7 +23,6 @@ from focgen.rig.rig import Rig
 from focgen.rig.session import entering, entry_of, run_of
 
 _SHOWN = 1e-3  # of the output's level: less of a zero shows in no reading
-_STEP = 0.02  # samples: less out of step is none
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +99,7 @@ def _closest(
     """The rig with the nominal parameters of all ``fits`` where that brings the output closer, else of those
     that bring it closest; each with the zero that the ``last`` segment's readings have.
     """
-    fits = [f for f in fits if len(f.problem.nominal_start) or f.problem.segment.entry == "command"]
+    fits = [f for f in fits if len(f.problem.nominal_start)]
 
     def moved(part: Sequence[Fit]) -> Rig:
         return _with_zero(_moved(rig, part), last, placed, logs)
@@ -114,15 +113,8 @@ def _closest(
 
 def _moved(rig: Rig, fits: Sequence[Fit]) -> Rig:
     for f in fits:
-        rig = _with_lead(f.problem.nominals.put(rig, f.vector[: len(f.problem.nominal_start)]), f)
+        rig = f.problem.nominals.put(rig, f.vector[: len(f.problem.nominal_start)])
     return rig
-
-
-def _with_lead(rig: Rig, of: Fit) -> Rig:
-    """The rig with what its command is ahead of its rows by, where that is another than it says."""
-    lead, step = float(f"{of.problem.rig_of_logs(of.vector).lead:.3g}"), of.problem.segment.fed.run.h
-    tells = of.problem.segment.entry == "command" and abs(lead - rig.lead) > _STEP * step
-    return replace(rig, lead=lead) if tells else rig
 
 
 def gap(rig: Rig, placed: Sequence[Placed], logs: Sequence[Experiment]) -> float:

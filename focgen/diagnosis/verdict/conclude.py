@@ -31,6 +31,7 @@ from focgen.diagnosis.verdict.cautions import (
 from focgen.diagnosis.verdict.confidence import tied
 from focgen.diagnosis.verdict.evidence import Evidence
 from focgen.diagnosis.verdict.improvement import Improvement
+from focgen.diagnosis.verdict.late import ahead_told
 from focgen.diagnosis.verdict.moments import another
 from focgen.diagnosis.verdict.moves import at_the_end, far_moves
 from focgen.diagnosis.verdict.moving import begun_moving
@@ -90,6 +91,7 @@ def conclude(
         notes=(
             *of_file(rig),
             *notes_of(logs),
+            *ahead_told(explanations[0], rig),
             *far,
             *(at_the_end(rig, summary.rigs.fitted) if strained and not far else ()),
             *cautions(summary.causes, unknown, list(doubted), [*off, *nominal_alone(explanations, off)]),

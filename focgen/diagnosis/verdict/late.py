@@ -17,6 +17,7 @@ from focgen.diagnosis.fitting.fit import Fit, Weighing, fit
 from focgen.diagnosis.hypotheses.explain import Explanation
 from focgen.diagnosis.problem.segments import Segment
 from focgen.diagnosis.verdict.instead import Instead, gone, is_likelier, likeliest, odds_over
+from focgen.rig.rig import Rig
 
 _LATEST = 16  # samples
 _ITERATIONS = 6
@@ -36,6 +37,20 @@ class Late(Instead):
             f"the command may be ({self.sure:.0%}) logged {self.seconds:.3g} s late ({self.samples} "
             "samples); see to it that each row has what was sent as the readings were taken"
         )
+
+
+def ahead_told(e: Explanation, rig: Rig) -> tuple[str, ...]:
+    """That the command is ahead of its rows, or behind them, where the ``rig`` that is written says so and
+    the one given did not."""
+    lead, given, step = rig.lead, e.best.problem.nominals.rig.lead, e.segment.fed.run.h
+    if e.segment.entry != "command" or lead == given:
+        return ()
+    what = f"the command is {abs(lead):.2g} s ({abs(lead) / step:.2g} samples)"
+    if lead < 0.0:
+        return (f"{what} behind its rows, or that is a dead time: written as lead in [signals]",)
+    return (
+        f"{what} ahead of its rows, which have it beside what was read later: written as lead in [signals]",
+    )
 
 
 @lru_cache(maxsize=16)
