@@ -40,7 +40,7 @@ CONSTANTS = {
     "hypotheses/left.py": ["_ERRORS", "_OFF", "_STILL"],
     "hypotheses/level_pace.py": ["_PART"],
     "hypotheses/longer_path.py": ["_HELD", "_KEPT"],
-    "hypotheses/nuisances.py": ["_GAUGE", "_HALF", "_OUT_OF_STEP", "_SMOOTHER"],
+    "hypotheses/nuisances.py": ["_AHEAD", "_GAUGE", "_HALF", "_OUT_OF_STEP", "_SMOOTHER", "_STEP"],
     "hypotheses/roughly.py": ["_NEAR"],
     "hypotheses/search.py": ["_ADRIFT", "_BENT", "_FAR", "_NEAR", "_QUICK"],
     "hypotheses/seen_through.py": ["_FINELY"],

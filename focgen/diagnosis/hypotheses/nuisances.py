@@ -31,7 +31,7 @@ from focgen.rig.session import entry_of
 # half of one where an input jumps, for a loop may read before it writes, the least. A row may have a command
 # and what was read later: no rig does that, so by two samples the output of a staircase may be early
 _OUT_OF_STEP, _HALF, _AHEAD = 0.05, 0.5, 2
-_STEP = 0.1  # samples: less out of step is what a fit may take up of anything
+_STEP = 0.05  # samples: less out of step is what a fit may take up of anything
 _GAUGE = 0.01  # of its reading: by what a gauge may be off without being a fault
 _WAYS = (Between.HELD, Between.STRAIGHT, Between.SMOOTH)  # of a command between its samples
 _SMOOTHER = 0.95  # of the mean square that lines leave: a smooth curve, which takes longer, has to leave less
