@@ -101,3 +101,12 @@ def test_a_log_is_replayed_as_far_ahead_as_the_rig_says():
     log = Experiment("e", H, {"command": command, "output": y})
     left = {lead: replay(replace(rig_of("both"), lead=lead), [log]).logs["e"].rmse for lead in (0.0, 0.12)}
     assert left[0.12] < 0.02 * left[0.0]
+
+
+@pytest.mark.parametrize("lead, sooner", [(0.1, 0), (0.24, 1)])
+def test_what_answers_at_once_is_the_command_that_acts(lead, sooner):
+    command, tap = np.r_[np.zeros(3), steps(1)[0]], {}
+    made = Run.of([len(command)], [0.0], H)
+    chain = Chain(replace(rig_of("fractional"), lead=lead))
+    chain.run(command, "regulator", "sensor", made, Between.HELD, tap)
+    np.testing.assert_allclose(tap["regulator"], np.r_[command[sooner:], np.full(sooner, command[-1])])
