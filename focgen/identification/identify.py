@@ -37,6 +37,7 @@ from focgen.logs.notes import listed
 from focgen.logs.rates import at_one_rate
 from focgen.logs.read import Logs, digest_of, each_of, read_logs
 from focgen.output import check_apart, write_file
+from focgen.rig.ahead import told_lead
 from focgen.rig.arguments import RigLike, rig_of, rig_then_logs
 from focgen.rig.files import check_replaces_rig, rig_text
 from focgen.rig.plausibility import doubts
@@ -138,16 +139,11 @@ def _with_stages(rig: Rig, found: dict[str, StageFit]) -> Rig:
     delays = replace(rig.delays, **{name: fit.delay for name, fit in found.items()})
     lead = rig.lead
     if "regulator" in found:  # whose command shows it
-        lead = _told_lead(found["regulator"].parameters.get("lead", (0.0, 0.0))[0])
+        lead = told_lead(found["regulator"].parameters.get("lead", (0.0, 0.0))[0])
     transfers: dict[str, Any] = {name: fit.transfer for name, fit in found.items()}
     known = with_stages(rig.uncertainty, found)
     rig = replace(rig, delays=delays, uncertainty=known, lead=lead, **transfers)
     return running(rig, found["regulator"].between) if "regulator" in found else rig
-
-
-def _told_lead(lead: float) -> float:
-    """A lead, s, with as many digits as a log can show."""
-    return float(f"{lead:.3g}")
 
 
 def _actuator(
@@ -179,7 +175,7 @@ def _actuator(
         actuator=actuator,
         zero=zero if of_sensor else rig.zero,
         delays=replace(rig.delays, actuator=joint.delay),
-        lead=_told_lead(joined.lead) if excitations[0].input_role == "command" else rig.lead,
+        lead=told_lead(joined.lead) if excitations[0].input_role == "command" else rig.lead,
         uncertainty=replace(rig.uncertainty, actuator=known),
     )
     joint = _as_written(joint, joined, actuator)

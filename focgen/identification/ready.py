@@ -77,7 +77,7 @@ def prepared(e: Experiment, rig: Rig, powers: int, before: float | None, lead: f
     if not lead:
         return prepare(e, rig, powers, before)
     command, signals = e["command"], dict(e.signals)
-    count = max(math.ceil(lead / e.sample_time), 0) or 1
+    count = max(math.ceil(lead / e.sample_time), 1)
     if before is None and not np.ptp(command[: count + 1]):
         signals["command"] = np.r_[command[:1], command[count + 1 :], np.full(count, command[-1])]
     else:

@@ -14,6 +14,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from focgen.arrays import Ints
+from focgen.rig.corners import transfer_of
 from focgen.rig.effects import Run
 from focgen.rig.rig import UNITY, Rig
 from focgen.rig.stages import STAGES
@@ -27,7 +28,7 @@ def in_step(rig: Rig, first: str, last: str, h: float) -> tuple[Rig, int, dict[s
     s sooner what leaves it comes; by stage, how many of these are too many for what answers at once: its own
     row's command, or one that was ahead by a sample or more."""
     stages = STAGES[STAGES.index(first) : STAGES.index(last) + 1]
-    stage = next((stage for stage in stages if _takes_time(rig, stage)), None)
+    stage = next((stage for stage in stages if takes_time(rig, stage)), None)
     if stage is None:
         return replace(rig, lead=0.0), 0, {}
     late = getattr(rig.delays, stage) - rig.lead
@@ -38,11 +39,14 @@ def in_step(rig: Rig, first: str, last: str, h: float) -> tuple[Rig, int, dict[s
     return replace(rig, lead=0.0, delays=delays), count, at_once
 
 
-def _takes_time(rig: Rig, stage: str) -> bool:
-    if stage == "actuator":
-        return getattr(rig.actuator, "dynamics", UNITY) != UNITY
-    made: bool = getattr(rig, stage) != UNITY
-    return made
+def takes_time(rig: Rig, stage: str) -> bool:
+    """Whether a stage is there, and more than 1."""
+    return transfer_of(rig, stage) not in (None, UNITY)
+
+
+def told_lead(lead: float) -> float:
+    """A lead, s, with as many digits as a log can show."""
+    return float(f"{lead:.3g}")
 
 
 @dataclass(frozen=True, eq=False)

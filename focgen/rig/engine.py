@@ -12,7 +12,7 @@ from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Between
 from focgen.rig import lags, linear, solved
 from focgen.rig import plant as plants
-from focgen.rig.ahead import in_step, longer
+from focgen.rig.ahead import in_step, longer, takes_time
 from focgen.rig.begun import from_there, past_of, with_past
 from focgen.rig.changeable import IN_STEPS
 from focgen.rig.courses import sharpened
@@ -128,7 +128,7 @@ class Chain:
                 lying = behind.lying(x, self._offset)
                 behind, run = lying, lying if run is behind else run.lying(x, self._offset)
             tapped[stage] = x
-            if between != Between.STRAIGHT and not self._passes(stage):
+            if between != Between.STRAIGHT and takes_time(self.rig, stage):
                 between = Between.STRAIGHT
         return x
 
@@ -136,13 +136,6 @@ class Chain:
     def _offset(self) -> float:
         """Where the actuator rests."""
         return 0.0 if self.rig.actuator is None else self.rig.actuator.offset
-
-    def _passes(self, stage: str) -> bool:
-        """Whether a stage leaves what its input does between samples as it is."""
-        if stage == "actuator":
-            return getattr(self.rig.actuator, "dynamics", UNITY) == UNITY
-        made: bool = getattr(self.rig, stage) == UNITY
-        return made
 
     def _begun(
         self,

@@ -17,6 +17,7 @@ import numpy as np
 
 from focgen.arrays import Array
 from focgen.fractional.transfer import TransferFunction
+from focgen.rig.corners import transfer_of
 from focgen.rig.effects import Run
 from focgen.rig.linear import single_lag
 from focgen.rig.rig import UNITY, Rig
@@ -30,7 +31,7 @@ _MOST = 8  # parts of a sample
 def parts_of(rig: Rig, first: str, last: str, h: float) -> int:
     """Into how many parts a sample of ``h`` s is to go from stage ``first`` to ``last``."""
     stages = STAGES[STAGES.index(first) : STAGES.index(last) + 1]
-    rates = [rate for stage in stages if (rate := _rate(_transfer_of(rig, stage))) is not None]
+    rates = [rate for stage in stages if (rate := _rate(transfer_of(rig, stage))) is not None]
     wrong = max((h * a * h * b / 12.0 for a, b in pairwise(rates)), default=0.0)
     if wrong < _WRONG:
         return 1
@@ -38,18 +39,11 @@ def parts_of(rig: Rig, first: str, last: str, h: float) -> int:
     return int(min(2**doubled, _MOST))
 
 
-def _transfer_of(rig: Rig, stage: str) -> TransferFunction:
-    made: TransferFunction = (
-        getattr(rig.actuator, "dynamics", UNITY) if stage == "actuator" else getattr(rig, stage)
-    )
-    return made
-
-
 @lru_cache(maxsize=64)
-def _rate(transfer: TransferFunction) -> float | None:
+def _rate(transfer: TransferFunction | None) -> float | None:
     """The part of a step, 1/s, by which its response begins to rise, 0 where it begins flat, as of two lags;
     None where it answers at once."""
-    if transfer == UNITY:
+    if transfer is None or transfer == UNITY:
         return None
     if lag := single_lag(transfer):
         _, T, alpha = lag

@@ -24,6 +24,7 @@ from focgen.diagnosis.problem.scales import references
 from focgen.diagnosis.problem.segments import Segment, owner
 from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
+from focgen.rig.ahead import told_lead
 from focgen.rig.rig import Rig
 from focgen.rig.session import entry_of
 
@@ -66,7 +67,7 @@ def _held(rig: Rig, segment: Segment, logs: Sequence[Experiment]) -> Problem:
     if len(problems) == 1:
         return problems[0]
     fits = [fit(p, p.nominal(), WHITE, 6) for p in problems]
-    stair = any(p.lead > p.slack for p in problems)
+    stair = any(p.is_staircase for p in problems)
     if (segment.answers or stair) and (held := _kept_held(fits)):
         return held.problem
     *plain, last = fits
@@ -111,7 +112,7 @@ def lead_of(best: Fit) -> float:
     problem, place, step = best.problem, len(best.problem.nominal_start), best.problem.segment.fed.run.h
     given, found = problem.nominals.rig.lead, problem.rig_of_logs(best.vector).lead
     inside = all(abs(best.vector[place] - end[place]) > _STEP for end in problem.bounds())
-    return float(f"{found:.3g}") if inside and abs(found - given) > _STEP * step else given
+    return told_lead(found) if inside and abs(found - given) > _STEP * step else given
 
 
 def ways(segment: Segment) -> list[Between]:

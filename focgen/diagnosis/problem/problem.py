@@ -185,7 +185,7 @@ class Problem:
     def _reach(self) -> tuple[float, float]:
         """By how many samples the output may be earlier and later than the rig says: as early as a file may
         say, and as late as a rig that says nothing."""
-        said = self.nominals.rig.lead / self.segment.fed.run.h if self._is_staircase else 0.0
+        said = self.nominals.rig.lead / self.segment.fed.run.h if self.is_staircase else 0.0
         return min(self.lead, max(FARTHEST - said, 0.0)), self.slack + max(said, 0.0)
 
     @property
@@ -240,14 +240,14 @@ class Problem:
         return self._lately("rigs", values.tobytes(), given, partial(self.nominals.put, given, values))
 
     @property
-    def _is_staircase(self) -> bool:
+    def is_staircase(self) -> bool:
         """Whether a part of a sample shows that columns are out of step by: the input jumps and rests."""
         return self.lead > self.slack and self.segment.fed.between == Between.HELD
 
     def rig_of_logs(self, vector: np.ndarray) -> Rig:
         """The rig, with its command as far ahead of its rows as the vector says."""
         rig = self.rig(vector)
-        shift = float(vector[len(self.nominal_start)]) if self._is_staircase else 0.0
+        shift = float(vector[len(self.nominal_start)]) if self.is_staircase else 0.0
         return replace(rig, lead=rig.lead - shift * self.segment.fed.run.h) if shift else rig
 
     def placed(self, vector: np.ndarray) -> tuple[Placed, ...]:
@@ -354,7 +354,7 @@ class Problem:
     def _entered(self, shift: float, off: np.ndarray, probe: bool) -> np.ndarray:
         """The input, ``shift`` samples out of step and ``off`` in the ways it is unsure; the same array where
         nothing changed, by which a chain remembers what it made of it."""
-        shift = 0.0 if self._is_staircase else shift  # the rig makes it
+        shift = 0.0 if self.is_staircase else shift  # the rig makes it
         key = (shift, *off.tolist())
         if not any(key):
             return self.segment.fed.bent
