@@ -29,6 +29,18 @@ from focgen.rig.steps import Step, chamber_step, fed_step, linear_step, uneven_s
 from focgen.rig.weak import can_be_solved, solved_weak, weakened
 
 
+@dataclass(frozen=True)
+class _Way:
+    """What a signal runs through, ``first`` to ``last`` stage, what it does from one sample to the next where
+    it enters, and what is told of it: as of :meth:`Chain.run`."""
+
+    first: str
+    last: str
+    between: Between | bool
+    tap: dict[str, Array] | None
+    left: list[dict[str, float]] | None
+
+
 @dataclass
 class Chain:
     """A rig with effects, made to be run again and again with few things changed.
@@ -64,60 +76,56 @@ class Chain:
         """
         if left is not None:
             left[:] = [{} for _ in self.placed]
+        return self._through(x, run, _Way(first, last, between, tap, left))
+
+    def _through(self, x: Array, run: Run, way: _Way) -> Array:
         if run.begins:
-            return self._begun(x, first, last, run, between, tap, left)
-        if self.rig.lead and between == Between.HELD and first == "regulator":
-            return self._ahead(x, first, last, run, tap, left)
-        parts = parts_of(self.rig, first, last, run.h) if between == Between.HELD else 1
+            return self._begun(x, run, way)
+        if self.rig.lead and way.between == Between.HELD and way.first == "regulator":
+            return self._ahead(x, run, way)
+        parts = parts_of(self.rig, way.first, way.last, run.h) if way.between == Between.HELD else 1
         if parts > 1:
             x = self._once("parts", parts, x, lambda x, run: np.repeat(x, parts), run)
-            y = self._run(x, first, last, finer(run, parts), between, tap, left)
-            return at_samples(y, tap, parts)
-        return self._run(x, first, last, run, between, tap, left)
+            return at_samples(self._in_turn(x, finer(run, parts), way), way.tap, parts)
+        return self._in_turn(x, run, way)
 
-    def _ahead(
-        self,
-        x: Array,
-        first: str,
-        last: str,
-        run: Run,
-        tap: dict[str, Array] | None,
-        left: list[dict[str, float]] | None,
-    ) -> Array:
-        """The same of a command that was sent ahead of its rows."""
-        rig, count, at_once = in_step(self.rig, first, last, run.h)
+    def _begun(self, x: Array, run: Run, way: _Way) -> Array:
+        """With what was before each experiment put ahead of it, and cut off again."""
+        x = self._once("past", run.begins, x, with_past, run)
+        long, kept = past_of(run)
+        y = self._through(x, long, way)
+        if way.tap is not None:
+            way.tap.update({stage: made[kept] for stage, made in way.tap.items()})
+        found: Array = y[kept]
+        return found
+
+    def _ahead(self, x: Array, run: Run, way: _Way) -> Array:
+        """Of a command that was sent ahead of its rows."""
+        rig, count, at_once = in_step(self.rig, way.first, way.last, run.h)
         chain = Chain(replace(rig, known=()), self.placed, self.remember, self.probe)
         if not count:
-            return chain.run(x, first, last, run, Between.HELD, tap, left)
+            return chain._through(x, run, way)
         long = longer(run, count)
         x = self._once("longer", count, x, lambda x, run: x[long.rows], run)
-        made = chain.run(x, first, last, long.run, Between.HELD, tap, left)
-        if tap is not None:
-            kept = {stage: np.maximum(long.kept - at_once.get(stage, 0), 0) for stage in tap}
-            tap.update({stage: tap[stage][rows] for stage, rows in kept.items()})
+        made = chain._through(x, long.run, way)
+        if way.tap is not None:
+            kept = {stage: np.maximum(long.kept - at_once.get(stage, 0), 0) for stage in way.tap}
+            way.tap.update({stage: way.tap[stage][rows] for stage, rows in kept.items()})
         found: Array = made[long.kept]
         return found
 
-    def _run(
-        self,
-        x: Array,
-        first: str,
-        last: str,
-        run: Run,
-        between: Between | bool,
-        tap: dict[str, Array] | None,
-        left: list[dict[str, float]] | None,
-    ) -> Array:
-        tapped = {} if tap is None else tap
-        begin, end = STAGES.index(first), STAGES.index(last)
+    def _in_turn(self, x: Array, run: Run, way: _Way) -> Array:
+        """One stage after the other, at the run's own samples."""
+        begin, end = STAGES.index(way.first), STAGES.index(way.last)
         keeps = {p.stage for p in self.placed if p.remembers and p.slot in EQUATIONS.values()}
         before, behind = run, run.held(x) if run.lasts else run
+        between = way.between
         for stage in STAGES[begin : end + 1]:
             for number, (key, act, placed) in enumerate(self.steps(stage, between)):
                 remembers = placed is not None and placed.remembers
                 own = before if remembers else run
-                if left is not None and placed is not None:
-                    left[_index(self.placed, placed)] = placed.leaves(x, own)
+                if way.left is not None and placed is not None:
+                    way.left[_index(self.placed, placed)] = placed.leaves(x, own)
                 x = self._once((stage, number), (key, _stands(placed, own)), x, act, own)
                 if remembers or (placed is None and stage in keeps):
                     run = behind
@@ -127,7 +135,8 @@ class Chain:
             if stage == "actuator" and self._offset:
                 lying = behind.lying(x, self._offset)
                 behind, run = lying, lying if run is behind else run.lying(x, self._offset)
-            tapped[stage] = x
+            if way.tap is not None:
+                way.tap[stage] = x
             if between != Between.STRAIGHT and takes_time(self.rig, stage):
                 between = Between.STRAIGHT
         return x
@@ -136,25 +145,6 @@ class Chain:
     def _offset(self) -> float:
         """Where the actuator rests."""
         return 0.0 if self.rig.actuator is None else self.rig.actuator.offset
-
-    def _begun(
-        self,
-        x: Array,
-        first: str,
-        last: str,
-        run: Run,
-        between: Between | bool,
-        tap: dict[str, Array] | None,
-        left: list[dict[str, float]] | None,
-    ) -> Array:
-        """The same with what was before each experiment put ahead of it, and cut off again."""
-        x = self._once("past", run.begins, x, with_past, run)
-        long, kept = past_of(run)
-        y = self.run(x, first, last, long, between, tap, left)
-        if tap is not None:
-            tap.update({stage: made[kept] for stage, made in tap.items()})
-        found: Array = y[kept]
-        return found
 
     def _once(
         self, place: Hashable, key: Hashable, x: Array, act: Callable[[Array, Run], Array], run: Run
