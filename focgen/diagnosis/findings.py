@@ -35,6 +35,7 @@ from focgen.diagnosis.hypotheses.roughly import alone, families_in, leaves_less_
 from focgen.diagnosis.numbers import NUMBERS
 from focgen.diagnosis.problem.segments import cuts, make
 from focgen.diagnosis.problem.smooth import freed, is_explained, slow_rest, strays
+from focgen.diagnosis.problem.within import bent_within
 from focgen.diagnosis.verdict import compose
 from focgen.diagnosis.verdict.at_the_output import seen_at_the_output
 from focgen.diagnosis.verdict.in_between import hiding, leaves_far_less, tell_the_same, without
@@ -340,4 +341,5 @@ def explain_all(
             ways = np.column_stack([input_covariance(e), rest])
         unsure = strays(segment, made, response, left, noise)
         x = x + problem.simulate(problem.level(e.best.vector, is_explained(left, noise))) - made
+        x = bent_within(problem, e.best.vector, x)
     return tuple(found)

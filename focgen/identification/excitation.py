@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -11,16 +12,17 @@ import numpy as np
 
 from focgen.arrays import Array, Bools
 from focgen.errors import FitError, LogError
-from focgen.fractional.simulation import Convolution
 from focgen.fractional.transfer import TransferFunction
 from focgen.identification.driven import Driven
 from focgen.identification.kernel import Kernels
+from focgen.identification.passed_on import run_stage, through
 from focgen.identification.smoothed import without_noise
 from focgen.logs.between import Between, Course, course_of, jumps_of, noise_level
 from focgen.logs.experiment import Experiment, check_output
 from focgen.logs.feedback import unlogged_reference
 from focgen.rig import kernels
 from focgen.rig.rig import UNITY, Rig
+from focgen.rig.within import by_regulator, course_within, is_quick, read_within
 
 _AT_REST = 0.02  # of the input's largest value: closer to 0 than this it starts at rest at 0
 _AWAY = 0.1  # of a step: nearer to one of its ends the input is at it
@@ -45,7 +47,8 @@ class Excitation:
     holds pressure^m − before^m, m = 1, 2, …, through the sensor where its output is fitted; ``sensor`` is 1
     where the curvature is. ``rest_shown``: whether the log begins before the first step, so that it shows the
     output's zero.
-    ``jumps`` (n,): where the input jumps, and what it ``runs`` like elsewhere.
+    ``jumps`` (n,): where the input jumps, and what it ``runs`` like elsewhere, or how it runs ``within`` each
+    sample (7, n), where that is known.
     ``reference`` (n,) where a loop was closed, logged or not. ``late``: the nominal dead time of the stages
     that it is seen through, s. ``begins_up``: whether the input was held away from 0 ahead of the first
     sample.
@@ -68,6 +71,7 @@ class Excitation:
     reference: Array | None = None
     late: float = 0.0
     begins_up: bool = False
+    within: Array | None = None
 
     def __len__(self) -> int:
         return len(self.measured)
@@ -118,7 +122,7 @@ class Excitation:
         """A drive that steps to 1 at the first sample and stays for as long as pasts are looked back to."""
         ones = np.ones((1, len(self) + self.looked_back))
         course = course_of(ones, np.zeros(ones.shape[1], bool), Between.HELD)
-        return Driven(course if self.sensor == UNITY else through(self.sensor, course, self.step))
+        return Driven(through(self.sensor, course, self.step))
 
     @property
     def looked_back(self) -> int:
@@ -131,25 +135,40 @@ class Excitation:
             return self
         pressure, measured = self.pressure[:count], self.measured[:count]
         course, jumps = self.course.until(count), self.jumps[:count]
-        return replace(self, pressure=pressure, measured=measured, course=course, jumps=jumps)
+        within = None if self.within is None else self.within[:, :count]
+        return replace(self, pressure=pressure, measured=measured, course=course, jumps=jumps, within=within)
 
     def behind(self, play: float) -> Excitation:
         """The same behind a play of the input of half width ``play``, units of it, which lies where the way
         from 0 to the first sample left it."""
         if not play:
             return self
-        left = -np.copysign(min(play, abs(self.before)), self.before)
-        never = np.zeros(len(self), np.uint8)
-        moved = kernels.play(self.pressure - self.before, never, play, float(left))
-        return self._driven_by(self.before + moved, self.before + float(left))
+        left = float(-np.copysign(min(play, abs(self.before)), self.before))
+
+        def moved(x: Array) -> Array:
+            return self.before + kernels.play(x - self.before, np.zeros(len(x), np.uint8), play, left)
+
+        return self._driven_by(moved, self.before + left)
 
     def beyond(self, zone: float) -> Excitation:
         """The same, driven by what is more than ``zone`` of the input, units of it, to either side of 0."""
-        more = [np.sign(p) * np.maximum(np.abs(p) - zone, 0.0) for p in (self.pressure, self.before)]
-        return self._driven_by(more[0], float(more[1]))
 
-    def _driven_by(self, drive: Array, before: float) -> Excitation:
-        course = _course(drive, before, self.powers, self.jumps, self.runs, self.sensor, self.step)
+        def more(x: Array) -> Array:
+            beyond: Array = np.sign(x) * np.maximum(np.abs(x) - zone, 0.0)
+            return beyond
+
+        return self._driven_by(more, float(more(np.array([self.before]))[0]))
+
+    def _driven_by(self, change: Callable[[Array], Array], before: float) -> Excitation:
+        """The same, driven by what a ``change`` makes of the input (n,), one moment after the other."""
+        within = self.within
+        if within is None:
+            drive = change(self.pressure)
+        else:
+            within = change(within.T.ravel()).reshape(within.T.shape).T
+            drive = within[-1]
+        course = _course(drive, before, self.powers, self.jumps, self.runs, within)
+        course = through(self.sensor, course, self.step)
         return replace(self, course=course)
 
     @property
@@ -168,11 +187,13 @@ def prepare(experiment: Experiment, rig: Rig, powers: int = 1, before: float | N
     _check(experiment)
     reference = _varying_reference(experiment)
     pressure, level_before, jumps, between, role = _input(experiment, rig, before, reference is not None)
+    within = _within(experiment, rig, role, pressure, level_before)
     fitted = "curvature" if "curvature" in experiment else "output"
     sensor = rig.sensor if fitted == "output" else UNITY
     if sensor != UNITY:
         _check_rest(sensor)
-    course = _course(pressure, level_before, powers, jumps, between, sensor, experiment.sample_time)
+    course = _course(pressure, level_before, powers, jumps, between, within)
+    course = through(sensor, course, experiment.sample_time)
     return Excitation(
         experiment.name,
         experiment.sample_time,
@@ -191,22 +212,17 @@ def prepare(experiment: Experiment, rig: Rig, powers: int = 1, before: float | N
         reference,
         rig.delays.regulator * (role == "command") + rig.delays.sensor * (fitted == "output"),
         abs(level_before) > _AT_REST * float(np.abs(pressure).max()),
+        within,
     )
 
 
 def _course(
-    drive: Array,
-    before: float,
-    powers: int,
-    jumps: Bools,
-    between: Between,
-    sensor: TransferFunction,
-    step: float,
+    drive: Array, before: float, powers: int, jumps: Bools, between: Between, within: Array | None
 ) -> Course:
-    """The course of the powers of a ``drive`` (n,), through the sensor."""
-    above = np.array([drive**m - before**m for m in range(1, powers + 1)])
-    course = course_of(above, jumps, between)
-    return course if sensor == UNITY else through(sensor, course, step)
+    """The course of the powers of a ``drive`` (n,), known ``within`` its samples (7, n) or not."""
+    known = drive if within is None else within
+    above = np.array([known**m - before**m for m in range(1, powers + 1)])
+    return course_of(above, jumps, between) if within is None else course_within(above)
 
 
 def possible_rests(experiment: Experiment) -> tuple[float | None, ...]:
@@ -279,8 +295,32 @@ def _input(
     gain = rig.regulator.dc_gain
     if not np.isfinite(gain):
         raise FitError("regulator", "integrates, so it has no rest to start from", "log the pressure")
-    moved = _run("regulator", rig.regulator, experiment.sample_time, _hold(rig), command - rest)
+    moved = run_stage("regulator", rig.regulator, experiment.sample_time, _hold(rig), command - rest)
     return gain * rest + moved, gain * rest, none, Between.SMOOTH, "command"
+
+
+def _within(experiment: Experiment, rig: Rig, role: str, pressure: Array, before: float) -> Array | None:
+    """The pressure (n,) within each sample (7, n), as a quick regulator makes it of a held command, from rest
+    at ``before``; None where that is not known."""
+    step, regulator = experiment.sample_time, rig.regulator
+    if "command" not in experiment or regulator == UNITY or _hold(rig) != "zero":
+        return None
+    if not is_quick(regulator, step):
+        return None
+    command = experiment["command"]
+    if role == "command":
+        return before + by_regulator(regulator, step, command - before / regulator.dc_gain, 0.0)
+    late = rig.delays.regulator - rig.lead
+    made = _scaled_to(pressure, by_regulator(regulator, step, command - command[0], late))
+    return read_within(pressure, made, np.arange(len(command)) == 0)
+
+
+def _scaled_to(readings: Array, made: Array) -> Array:
+    """What was made (7, n), with the gain and the zero that suit the readings (n,)."""
+    columns = np.column_stack([np.ones(len(readings)), made[-1]])
+    (zero, gain), *_ = np.linalg.lstsq(columns, readings, rcond=None)
+    found: Array = zero + gain * made
+    return found
 
 
 def _measured(experiment: Experiment, rig: Rig, closed: bool) -> tuple[Array, Bools]:
@@ -300,7 +340,7 @@ def _by_regulator(experiment: Experiment, rig: Rig) -> Array | None:
     if "command" not in experiment or rig.regulator == UNITY or not np.isfinite(rig.regulator.dc_gain):
         return None
     command, places = experiment["command"], np.arange(len(experiment["command"]))
-    moved = _run("regulator", rig.regulator, experiment.sample_time, _hold(rig), command - command[0])
+    moved = run_stage("regulator", rig.regulator, experiment.sample_time, _hold(rig), command - command[0])
     made: Array = np.interp(places - rig.delays.regulator / experiment.sample_time, places, moved)
     return made
 
@@ -308,39 +348,6 @@ def _by_regulator(experiment: Experiment, rig: Rig) -> Array | None:
 def _hold(rig: Rig) -> Literal["zero", "linear"]:
     """What a command does between its samples, in front of a regulator."""
     return "zero" if rig.between in (None, Between.HELD) else "linear"
-
-
-def _run(
-    name: str, stage: TransferFunction, step: float, hold: Literal["zero", "linear"], signal: Array
-) -> Array:
-    """What a stage makes of its input, from rest."""
-    try:
-        return Convolution(stage, step, hold).run(signal)
-    except ArithmeticError as reason:
-        raise FitError(name, f"cannot be simulated ({reason})", "check its num and den") from None
-
-
-def through(sensor: TransferFunction, course: Course, step: float) -> Course:
-    """The course of what the sensor makes of ``course``.
-
-    A bend of coefficient c holds c/6 of a sample less than the straight line; what lies at both its ends is
-    lowered by c/12 instead, which a stage that is slow against the samples answers alike.
-    """
-    less = np.zeros_like(course.values)
-    if course.bends is not None:
-        less += course.bends / 12.0
-        less[:, :-1] += course.bends[:, 1:] / 12.0
-    jumped = np.cumsum(course.jumps, axis=1)
-    rows = [
-        _run("sensor", sensor, step, "zero", up) + _run("sensor", sensor, step, "linear", rest)
-        for up, rest in zip(jumped, course.values - jumped - less)
-    ]
-    at_once = np.any(course.jumps != 0.0, axis=0) & _feeds_through(sensor)
-    return course_of(np.array(rows), at_once)
-
-
-def _feeds_through(stage: TransferFunction) -> bool:
-    return stage.num[0].order == stage.den[0].order
 
 
 def _check_rest(sensor: TransferFunction) -> None:

@@ -256,13 +256,15 @@ class Problem:
             Placed(c.effect, c.form, c.stage, v) for c, v in zip(self.candidates, self.values(vector))
         )
 
-    def simulate(self, vector: np.ndarray, probe: bool = False) -> np.ndarray:
+    def simulate(self, vector: np.ndarray, probe: bool = False, late: float = 0.0) -> np.ndarray:
         """The segment's output (n,), in the log's units; a ``probe`` leaves nothing to the simulations that
-        follow, which go on from another vector. A plant that runs away with these numbers leaves no finite
-        ones, which no fit takes: that is no fault to warn of."""
+        follow, which go on from another vector. ``late``: s by which a held command comes later. A plant
+        that runs away with these numbers leaves no finite ones, which no fit takes: no fault to warn of."""
         own, segment = len(self.nominal_start), self.segment
         shift = float(vector[own])
-        chain = Chain(self.rig_of_logs(vector), self.placed(vector), self.memory, probe)
+        rig = self.rig_of_logs(vector)
+        rig = replace(rig, lead=rig.lead - late) if late else rig
+        chain = Chain(rig, self.placed(vector), self.memory, probe)
         gauges, off, begun, zeros, stood = self._parted(vector[own + 1 : self.head])
         run = self._begun(stood, probe)
         x = self._entered(shift, off, probe)

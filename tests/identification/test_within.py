@@ -1,0 +1,64 @@
+"""A regulator with few samples in its time: the actuator behind it keeps its numbers.
+
+Red when T, alpha or K take up what the pressure does between its readings, or a lead is found in it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from focgen.fractional.simulation import Convolution
+from focgen.fractional.transfer import TransferFunction
+from focgen.identification.identify import identify
+from focgen.logs.experiment import Experiment
+from focgen.rig.rig import Actuator, Rig, Signals
+
+H, T, GAIN, COUNT = 0.2, 1.0, 0.66, 800
+SIGNALS = {True: Signals("t", "y", "u", "p"), False: Signals("t", "y", "u")}
+
+
+def staircase(rng):
+    return np.r_[np.zeros(10), np.repeat(rng.uniform(0.0, 3.0, COUNT), rng.integers(5, 30, COUNT))][:COUNT]
+
+
+def sines(rng):
+    phases = np.outer(np.arange(COUNT) * H, 2.0 * np.pi * np.array([0.02, 0.05, 0.13, 0.31]))
+    return 1.5 + 0.4 * np.sin(phases + rng.uniform(0.0, 6.0, 4)).sum(1)
+
+
+def logs_of(command_of, tau, alpha, pressure):
+    """Two logs of a held command: the pressure is the exact one of a lag, and what is behind both is exact,
+    too, as one transfer function."""
+    rng, logs = np.random.default_rng(5), []
+    lag = TransferFunction([(1.1, 0.0)], [(tau, 1.0), (1.0, 0.0)])
+    den = [(tau * T**alpha, 1.0 + alpha), (tau, 1.0), (T**alpha, alpha), (1.0, 0.0)]
+    if alpha == 1.0:
+        den = [(tau * T, 2.0), (tau + T, 1.0), (1.0, 0.0)]
+    both = TransferFunction([(1.1 * GAIN, 0.0)], den)
+    for number in range(2):
+        command = command_of(rng)
+        moved = command - command[0]
+        signals = {"command": command}
+        for role, stage, noise in (("output", both, 0.006), ("pressure", lag, 0.009)):
+            made = stage.dc_gain * command[0] + Convolution(stage, H).run(moved)
+            signals[role] = made + rng.normal(0.0, noise, COUNT)
+        kept = {role: values for role, values in signals.items() if pressure or role != "pressure"}
+        logs.append(Experiment(f"e{number}", H, kept, start=900.0 * number))
+    return logs
+
+
+@pytest.mark.parametrize("pressure", [True, False])
+@pytest.mark.parametrize("alpha", [1.0, 0.7])
+@pytest.mark.parametrize("command_of", [staircase, sines])
+def test_the_actuator_behind_a_quick_regulator_keeps_its_numbers(command_of, alpha, pressure):
+    tau = 0.08
+    lag = TransferFunction([(1.1, 0.0)], [(tau, 1.0), (1.0, 0.0)])
+    rough = Rig("finger", H, SIGNALS[pressure], Actuator(T, alpha, (GAIN,)), regulator=lag)
+    stages = ("regulator", "actuator") if pressure else ("actuator",)
+    found = identify(rough, logs_of(command_of, tau, alpha, pressure), stages=stages, integer=False).rig
+    time = found.actuator.T ** (1.0 / found.actuator.alpha)
+    assert time == pytest.approx(T, rel=0.01)
+    assert found.actuator.alpha == pytest.approx(alpha, abs=0.006)
+    assert np.polyval(found.actuator.gain[::-1], 1.65) == pytest.approx(GAIN, rel=0.006)  # the middle of it
+    assert found.lead == 0.0
