@@ -17,7 +17,8 @@ from focgen.rig.rig import UNITY
 def run_stage(
     name: str, stage: TransferFunction, step: float, hold: Literal["zero", "linear"], signal: Array
 ) -> Array:
-    """What a stage makes of its input, from rest."""
+    """What the stage of that ``name`` makes of its input (n,), from rest. Raises FitError where it cannot be
+    simulated."""
     try:
         return Convolution(stage, step, hold).run(signal)
     except ArithmeticError as reason:
