@@ -30,7 +30,8 @@ class Estimate:
 @dataclass(frozen=True)
 class Candidate:
     """An effect that may be the cause, in ``stage``. ``confidence``: probability; ``separation``: standard
-    deviations behind the best."""
+    deviations behind the best; ``sizes``: how large it is, as one would measure it on the rig, whatever its
+    form and that one's parameters are."""
 
     effect: str
     stage: str
@@ -38,6 +39,7 @@ class Candidate:
     form: str
     parameters: dict[str, Estimate]
     separation: float
+    sizes: dict[str, Estimate] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from focgen.diagnosis.drawn import Drawn, Mean, Residual, Trace
-from focgen.diagnosis.model import Candidate, Diagnosis, Found
+from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Found
+from focgen.diagnosis.verdict.on_the_bench import seen_as
 from focgen.logs.experiment import ROLES
 from focgen.logs.notes import listed
 from focgen.rig.effects import Form, library
@@ -26,7 +27,7 @@ def turned_back(diagnosis: Diagnosis, turn: Turn) -> Diagnosis:
     refitted, augmented, drawn = diagnosis.refitted, diagnosis.augmented, diagnosis.drawn
     return replace(
         diagnosis,
-        causes=tuple(_signed(found, turn) for found in diagnosis.causes),
+        causes=tuple(_signed(found, turn, diagnosis.refitted) for found in diagnosis.causes),
         refitted=None if refitted is None else _rig(refitted, back),
         augmented=None if augmented is None else _rig(augmented, back),
         drawn=None if drawn is None else _drawn(drawn, back),
@@ -40,22 +41,30 @@ def _rig(rig: Rig, back: Turn) -> Rig:
     return logged if logged.effects else replace(logged, downwards=frozenset(), origins=Origins())
 
 
-def _signed(found: Found, turn: Turn) -> Found:
+def _signed(found: Found, turn: Turn, rig: Rig | None) -> Found:
     """A cause whose numbers that may have either sign, and are in a signal's unit, have that of the log."""
-    return replace(found, candidates=tuple(_candidate(c, turn) for c in found.candidates))
+    return replace(found, candidates=tuple(_candidate(c, turn, rig) for c in found.candidates))
 
 
-def _candidate(candidate: Candidate, turn: Turn) -> Candidate:
+def _candidate(candidate: Candidate, turn: Turn, rig: Rig | None) -> Candidate:
     family = library().get(candidate.effect)
     form = next((f for f in family.forms if f.name == candidate.form), None) if family else None
-    if form is None or turn.signs[_role(form, candidate.stage)] > 0:
+    if family is None or form is None:
         return candidate
-    either = {p.name for p in form.parameters if p.level == 1 and p.lower < 0.0}
-    changed = {
+    parameters, sizes = candidate.parameters, candidate.sizes
+    if turn.signs[_role(form, candidate.stage)] < 0:
+        parameters = _other(parameters, {p.name for p in form.parameters if p.level == 1 and p.lower < 0.0})
+    if turn.signs[seen_as(LEAVES[candidate.stage], rig)] < 0:
+        sizes = _other(sizes, {size.what for size in family.sizes if size.signed})
+    return replace(candidate, parameters=parameters, sizes=sizes)
+
+
+def _other(known: dict[str, Estimate], either: set[str]) -> dict[str, Estimate]:
+    """What is known, those of ``either`` sign with the other one."""
+    return {
         name: replace(e, value=-e.value, ci95=(-e.ci95[1], -e.ci95[0])) if name in either else e
-        for name, e in candidate.parameters.items()
+        for name, e in known.items()
     }
-    return replace(candidate, parameters=changed)
 
 
 def _role(form: Form, stage: str) -> str:

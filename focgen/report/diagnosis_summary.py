@@ -71,8 +71,9 @@ def _listed(candidates: list[Candidate]) -> str:
 
 
 def _size(candidate: Candidate) -> str:
-    """The parameters that are known, with their units."""
-    known = [_value(name, e) for name, e in candidate.parameters.items() if name != "scale" and _is_known(e)]
+    """How large it is, else the parameters that are known, with their units."""
+    sizes = candidate.sizes or {k: e for k, e in candidate.parameters.items() if k != "scale"}
+    known = [_value(name, e) for name, e in sizes.items() if _is_known(e)]
     return f" ({', '.join(known[:_SHOWN])})" if known else ""
 
 

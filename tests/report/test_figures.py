@@ -133,7 +133,8 @@ def test_a_page_says_where_which_how_far_and_what_next():
         "What the numbers mean",
     ]
     which, ahead = page.sections[1], page.sections[3]
-    assert ("hysteresis", "1", "actuator", "80%", "width", "0.4", "0.3 to 0.5", "bar") in which.tables[0].rows
+    row = ("hysteresis", "1", "actuator", "80%", "play: width", "0.4", "0.3 to 0.5", "bar")
+    assert row in which.tables[0].rows
     assert "a slow sine" in ahead.sentences[0]
     assert all(figure.numbers.rows and figure.alt for section in page.sections for figure in section.figures)
     labels = [

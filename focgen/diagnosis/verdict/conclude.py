@@ -36,6 +36,7 @@ from focgen.diagnosis.verdict.moments import another
 from focgen.diagnosis.verdict.moves import at_the_end, far_moves
 from focgen.diagnosis.verdict.moving import begun_moving
 from focgen.diagnosis.verdict.nominal import likelier_nominal, nominal_alone, unnamed
+from focgen.diagnosis.verdict.on_the_bench import measured
 from focgen.diagnosis.verdict.sizes import at_their_ends, estimates
 from focgen.diagnosis.verdict.summary import Summary, doubts, sorted_out, sound_parts
 from focgen.diagnosis.verdict.unexplained import acts_besides, disturbed
@@ -252,7 +253,10 @@ def _candidate(rival: Rival, confidence: float, rig: Rig) -> Candidate:
         parameters |= {prefix + k: v for k, v in estimates(rival.fit, i, rig).items()}
     likeliest = candidate[places[0]]
     separation = float(rival.separation)
-    return Candidate(rival.effect, likeliest.stage, confidence, likeliest.form.name, parameters, separation)
+    sizes = measured(rival.fit, rival.effect, parameters, rig)
+    return Candidate(
+        rival.effect, likeliest.stage, confidence, likeliest.form.name, parameters, separation, sizes
+    )
 
 
 def _ordered(found: Sequence[Found]) -> tuple[Found, ...]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from focgen.control.units import units_of_rig
 from focgen.diagnosis.fitting.fit import FIXED, Fit
 from focgen.diagnosis.hypotheses.rivals import Rival
 from focgen.diagnosis.model import Estimate
-from focgen.rig.effects import Parameter
+from focgen.rig.effects import STEP, Parameter
 from focgen.rig.placed import slot_in
 from focgen.rig.rig import Actuator, Rig
 
@@ -27,18 +29,44 @@ def estimates(of: Fit, which: int, rig: Rig) -> dict[str, Estimate]:
     by name.
     """
     problem, candidate = of.problem, of.problem.candidates[which]
-    place = problem.head + sum(len(c.form.parameters) for c in problem.candidates[:which])
-    sigma = of.sse / max(len(of.innovations) - len(of.vector), 1)
-    spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(of.information)) * sigma, 0.0))
+    places, covariance = spread(of, [which])
+    deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     slot, found = slot_in(candidate.form, candidate.stage), {}
-    for i, parameter in enumerate(candidate.form.parameters):
-        v, s = of.vector[place + i], 1.96 * spread[place + i]
+    for parameter, place, deviation in zip(candidate.form.parameters, places, deviations):
+        v, s = of.vector[place], 1.96 * deviation
         scale = problem.references.scale(parameter, slot)
         ends = [
             float(scale * (np.exp(np.clip(e, -60, 60)) if parameter.log else e)) for e in (v - s, v, v + s)
         ]
-        found[parameter.name] = Estimate(ends[1], (ends[0], ends[2]), unit_of_parameter(parameter, slot, rig))
+        unit = unit_of_parameter(parameter, slot, rig)
+        ends = _counted(ends, np.ptp(problem.segment.y)) if parameter.name == STEP else ends
+        found[parameter.name] = Estimate(ends[1], (ends[0], ends[2]), unit)
     return found
+
+
+def _counted(ends: Sequence[float], span: float) -> list[float]:
+    """The interval of a step: its levels are counted, so that a step which is further off would be half a
+    level off over the ``span`` of the readings."""
+    low, step, high = ends
+    off = 0.5 * step**2 / max(span, step)
+    return [max(low, step - off), step, min(high, step + off)]
+
+
+def spread(of: Fit, which: Sequence[int], own: bool = False) -> tuple[list[int], np.ndarray]:
+    """Where in its vector the parameters of these candidate effects of a fit are, and their covariance; with
+    the rig's ``own`` ahead of them. A gauge or a begin that may be off is no further off than it may be."""
+    places = list(range(len(of.problem.nominal_start))) if own else []
+    place = of.problem.head
+    for number, candidate in enumerate(of.problem.candidates):
+        count = len(candidate.form.parameters)
+        places += range(place, place + count) if number in which else ()
+        place += count
+    sigma = of.sse / max(len(of.innovations) - len(of.vector), 1)
+    low, high = of.problem.bounds()
+    within = 12.0 / np.maximum(high - low, FIXED) ** 2  # 1/variance of what may be anything between two ends
+    within[: len(of.problem.nominal_start)] = within[of.problem.head :] = 0.0
+    known = of.information + sigma * np.diag(within)
+    return places, np.linalg.pinv(known)[np.ix_(places, places)] * sigma
 
 
 def at_their_ends(rival: Rival) -> tuple[str, ...]:

@@ -102,19 +102,22 @@ def _shares(found: Diagnosis) -> TableOf:
 
 
 def sizes(found: Diagnosis, units: Mapping[str, str]) -> tuple[TableOf, ...]:
-    """Every candidate with its confidence and its parameters, in the log's units."""
+    """Every candidate with its confidence, its sizes and the parameters of its form, in the log's units."""
     rows = []
     for i, cause in enumerate(found.causes, 1):
         for candidate in cause.candidates:
             head = (candidate.effect, str(i), cause.stage, f"{candidate.confidence:.0%}")
-            known: list[tuple[str, Estimate | None]] = [
-                (name, e) for name, e in candidate.parameters.items() if name != "scale"
+            known: list[tuple[str, Estimate | None]] = [*candidate.sizes.items()]
+            known += [
+                (f"{candidate.form}: {name}", e)
+                for name, e in candidate.parameters.items()
+                if name != "scale" and name not in candidate.sizes
             ]
             for name, estimate in known or [("–", None)]:
                 rows.append((*head, name, *_cells(estimate, units)))
     if not rows:
         return ()
-    heads = ("effect", "cause", "stage", "confidence", "parameter", "value", "95 % interval", "unit")
+    heads = ("effect", "cause", "stage", "confidence", "size", "value", "95 % interval", "unit")
     return (TableOf(heads, tuple(rows), "What was found, with its size"),)
 
 

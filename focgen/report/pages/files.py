@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +29,7 @@ _CANDIDATE = {  # and its stage, which earlier versions did not write
     "confidence": float,
     "form": str,
     "parameters": dict,
+    "sizes?": dict,
     "separation": (float, None),
 }
 _FOUND = {"stage": str, "candidates": [_CANDIDATE], "shrink": (float, None), "shrink_interval": _SPAN}
@@ -76,7 +79,7 @@ def _sound(value: dict[str, Any]) -> bool:
     """What a shape cannot say: intervals have two ends, shares are numbers, parameters estimates."""
     spans = [value["shrink_interval"]] + [cause["shrink_interval"] for cause in value["causes"]]
     candidates = [candidate for cause in value["causes"] for candidate in cause["candidates"]]
-    estimates = [estimate for one in candidates for estimate in one["parameters"].values()]
+    estimates = [estimate for one in candidates for estimate in _told(one)]
     return (
         all(span is None or len(span) == 2 for span in spans)
         and all(0.0 <= candidate["confidence"] <= 1.0 for candidate in candidates)
@@ -89,18 +92,26 @@ def _sound(value: dict[str, Any]) -> bool:
     )
 
 
+def _told(candidate: dict[str, Any]) -> Iterator[Any]:
+    """The sizes and parameters of a candidate; sizes earlier versions did not write."""
+    return chain(candidate.get("sizes", {}).values(), candidate["parameters"].values())
+
+
 def _found(value: dict[str, Any]) -> Found:
     candidates = tuple(_candidate({"stage": value["stage"]} | one) for one in value["candidates"])
     return Found(value["stage"], candidates, _real(value["shrink"]), present(_pair(value["shrink_interval"])))
 
 
 def _candidate(value: dict[str, Any]) -> Candidate:
-    parameters = {
-        name: Estimate(_real(e["value"]), present(_pair(e["ci95"])), e["unit"])
-        for name, e in value["parameters"].items()
-    }
+    parameters, sizes = (_estimates(value.get(key, {})) for key in ("parameters", "sizes"))
     effect, stage, confidence, form = (value[k] for k in ("effect", "stage", "confidence", "form"))
-    return Candidate(effect, stage, confidence, form, parameters, _real(value["separation"]))
+    return Candidate(effect, stage, confidence, form, parameters, _real(value["separation"]), sizes)
+
+
+def _estimates(value: dict[str, Any]) -> dict[str, Estimate]:
+    return {
+        name: Estimate(_real(e["value"]), present(_pair(e["ci95"])), e["unit"]) for name, e in value.items()
+    }
 
 
 def _real(value: float | None) -> float:

@@ -55,13 +55,13 @@ def _sizes(found: Diagnosis) -> TableOf | None:
 
 
 def _candidates(found: Diagnosis) -> Rows:
-    """A row for each parameter of each candidate; one without parameters has a row as well."""
+    """A row for each size and each parameter of each candidate; one without any has a row as well."""
     rows = []
     for number_of, cause in enumerate(found.causes, 1):
         for one in cause.candidates:
             head: dict[str, Any] = {"cause": number_of, "stage": cause.stage, "effect": one.effect}
             head |= {"confidence": one.confidence, "shrink": cause.shrink}
-            for name, estimate in one.parameters.items():
+            for name, estimate in (*one.sizes.items(), *one.parameters.items()):
                 size = {"value": estimate.value, "low": estimate.ci95[0], "high": estimate.ci95[1]}
                 rows.append(head | {"parameter": name} | size | {"unit": estimate.unit})
             if not one.parameters:

@@ -23,6 +23,7 @@ from focgen.rig.effects._effect import (
     Parameter,
     Run,
 )
+from focgen.rig.effects._sizes import Size
 
 __all__ = [
     "EQUATIONS",
@@ -33,6 +34,7 @@ __all__ = [
     "Form",
     "Parameter",
     "Run",
+    "Size",
     "form_of",
     "library",
 ]

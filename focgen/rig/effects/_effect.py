@@ -16,6 +16,7 @@ import numpy as np
 from focgen.arrays import Array, Bytes, Complex
 from focgen.fractional.transfer import Polynomial
 from focgen.logs.begin import Begin
+from focgen.rig.effects._sizes import Size
 
 SLOTS = {
     "regulator": ("command", "chamber", "supply"),
@@ -276,7 +277,8 @@ Check = Callable[[Excitation], str | None]
 class Effect:
     """A family. ``stage`` is the usual one, ``also`` others it may sit in, where those at home leave much.
 
-    ``needs`` is the identifiability check: what the experiments lack to show the effect, or None.
+    ``needs`` is the identifiability check: what the experiments lack to show the effect, or None. ``sizes``:
+    how large it is, as one would measure it.
     ``bends``: its curves leave the gain at zero as it is, and change it elsewhere. ``remembers``: it stays
     where an experiment left it, whatever rest follows. ``slow``: what it was fed is in it long after the rig
     has forgotten that. ``static``: what it changes depends on the level alone, as the error of a nominal
@@ -289,6 +291,7 @@ class Effect:
     reveals: str
     confused_with: tuple[str, ...]
     needs: Check
+    sizes: tuple[Size, ...]
     forms: Sequence[Form]
     also: tuple[str, ...] = ()
     bends: bool = False

@@ -8,6 +8,7 @@ from focgen.arrays import Array
 from focgen.rig.dynamics import Dynamics
 from focgen.rig.effects._curves import softly_beyond
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
+from focgen.rig.effects._sizes import own
 
 _PLACE = Parameter("curvature", level=1, lower=0.1, upper=1.3, starts=(0.8, 0.5, 0.95), zero=1.3)
 
@@ -60,6 +61,7 @@ EFFECT = Effect(
     confused_with=("gain_nonlinearity", "sensor_saturation", "sensor_nonlinearity", "supply_saturation"),
     needs=lambda e: None if e.levels >= 4 else "needs four or more levels",
     static=True,
+    sizes=(own("curvature", "obstacle at"),),
     forms=[
         Form(
             "knee",

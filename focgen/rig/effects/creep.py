@@ -6,6 +6,7 @@ from focgen.arrays import Array, Complex
 from focgen.rig import kernels
 from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter, Run, Values
 from focgen.rig.effects._lags import lag_response
+from focgen.rig.effects._sizes import FURTHER_CREEP
 
 _DECADES = np.geomspace(0.03, 30.0, 7)
 _SHARE = Parameter("share", lower=0.0, upper=3.0, starts=(0.1, 0.1), zero=0.0)
@@ -65,6 +66,7 @@ EFFECT = Effect(
     confused_with=("sensor_relaxation", "sensor_lag", "sensor_drift", "gain_drift", "softening"),
     slow=True,
     needs=lambda e: None if e.hold > 8 else "no hold is long beside the rig's response: hold a level longer",
+    sizes=(FURTHER_CREEP,),
     forms=[
         Form("pole", "response", (_SHARE, _tau(6.0, 12.0, 60.0)), _pole, response=_pole_response),
         Form(

@@ -8,6 +8,7 @@ from focgen.arrays import Array
 from focgen.rig.dynamics import Dynamics
 from focgen.rig.effects._curves import softly_beyond
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
+from focgen.rig.effects._sizes import own
 
 _LEVEL = Parameter("threshold", level=1, lower=0.0, upper=0.9, starts=(0.05, 0.25), zero=0.0)
 
@@ -40,6 +41,7 @@ EFFECT = Effect(
     needs=lambda e: None if e.lowest < 0.35 else "no level below a third of the range was visited",
     also=("regulator",),
     static=True,
+    sizes=(own("threshold", "threshold", "preload"),),
     forms=[
         Form("hard", "load", (_LEVEL,), _hard),
         Form(

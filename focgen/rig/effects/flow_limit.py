@@ -10,6 +10,7 @@ from focgen.rig.dynamics import Dynamics, Flow, Throat
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 from focgen.rig.effects._lags import PACE, RATE, THROAT
 from focgen.rig.effects._pumps import given
+from focgen.rig.effects._sizes import HIGHEST_RATE
 
 
 def _hard(x: Array, values: Values, run: Run) -> Array:
@@ -50,6 +51,7 @@ EFFECT = Effect(
     reveals="steps of several sizes: the slope stays the same while the step grows",
     confused_with=("slow_regulator", "valve_asymmetry"),
     needs=lambda e: None if e.levels >= 3 and e.fastest < 1.0 else "needs fast steps of several sizes",
+    sizes=(HIGHEST_RATE,),
     forms=[
         Form("hard", "supply", (RATE,), _hard),
         # what flows into the chamber itself

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from focgen.rig.dynamics import Dynamics, Friction, Rise
 from focgen.rig.effects._effect import Effect, Form, Parameter, Values
+from focgen.rig.effects._sizes import own
 
 
 def _coulomb(x: Dynamics, values: Values, run: None) -> Dynamics:
@@ -40,6 +41,7 @@ EFFECT = Effect(
     confused_with=("hysteresis", "dead_zone", "valve_stiction", "sensor_hysteresis", "sensor_nonlinearity"),
     needs=lambda e: None if e.reversals or e.unloads else "the input never turns round",
     remembers=True,
+    sizes=(own("force"),),
     forms=[
         Form("coulomb", "dynamics", (_FORCE,), _coulomb),
         Form("rising", "dynamics", (_FORCE, _RISE, _SPEED), _rising),

@@ -5,6 +5,7 @@ from dataclasses import replace
 from focgen.arrays import Array
 from focgen.rig.effects import _trends
 from focgen.rig.effects._effect import Effect
+from focgen.rig.effects._sizes import GAIN_OVER_SESSION
 
 
 def _grown(x: Array, trend: Array) -> Array:
@@ -27,5 +28,6 @@ EFFECT = Effect(
     reveals="the same experiment at the start and at the end",
     confused_with=("sensor_drift", "softening", "creep", "leak", "gain_nonlinearity"),
     needs=lambda e: None if e.repeats else "no level is repeated later in the session",
+    sizes=(GAIN_OVER_SESSION,),
     forms=[*_DRIVE, *_SPRING],
 )

@@ -8,6 +8,7 @@ from focgen.arrays import Array
 from focgen.rig.dynamics import Bend, Dynamics, Lever, Power, Spring
 from focgen.rig.effects import _curves
 from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter, Run, Values
+from focgen.rig.effects._sizes import BOW
 
 
 def _cubic(x: Array, values: Values, run: Run) -> Array:
@@ -67,6 +68,7 @@ EFFECT = Effect(
     also=("regulator",),
     bends=True,
     static=True,
+    sizes=(BOW,),
     forms=[
         Form(
             "cubic",

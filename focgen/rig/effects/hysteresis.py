@@ -8,6 +8,7 @@ from focgen.rig import kernels
 from focgen.rig.dynamics import Dynamics, Spring
 from focgen.rig.effects import _loops
 from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter, Run, Values
+from focgen.rig.effects._sizes import WIDEST_LOOP
 
 
 def _spring(x: Dynamics, values: Values, run: None) -> Dynamics:
@@ -53,6 +54,7 @@ EFFECT = Effect(
     ),
     needs=lambda e: None if e.reversals or e.unloads else "the input never turns round",
     remembers=True,
+    sizes=(WIDEST_LOOP,),
     forms=[
         *_loops.forms("drive"),
         Form("spring", "dynamics", (_SHARE, _LOADING, _UNLOADING, LARGEST), _spring),

@@ -5,6 +5,7 @@ from scipy.signal import lfilter
 
 from focgen.arrays import Array
 from focgen.rig.effects._effect import LARGEST, Effect, Form, Parameter, Run, Values
+from focgen.rig.effects._sizes import LOST
 
 
 def _laminar(x: Array, values: Values, run: Run) -> Array:
@@ -46,6 +47,7 @@ EFFECT = Effect(
         "valve_asymmetry",
     ),
     needs=lambda e: None if e.levels >= 3 else "needs three or more levels",
+    sizes=(LOST,),
     forms=[
         Form(
             "laminar",

@@ -9,6 +9,7 @@ from focgen.arrays import Array, Complex
 from focgen.fractional.transfer import Polynomial
 from focgen.rig.dynamics import Dynamics
 from focgen.rig.effects._effect import PERIOD, Effect, Form, Parameter, Run, Values
+from focgen.rig.effects._sizes import FREQUENCY, own
 from focgen.rig.linear import oscillator
 
 
@@ -73,6 +74,7 @@ EFFECT = Effect(
     reveals="fast steps, sines up to the mode: ringing of one frequency",
     confused_with=("sensor_lag", "transport_delay"),
     needs=lambda e: None if e.fastest < 1.0 else "no change of the input is fast beside the rig's response",
+    sizes=(FREQUENCY, own("damping")),
     forms=[
         Form(
             "series",

@@ -2,6 +2,7 @@
 
 from focgen.rig.effects import _trends
 from focgen.rig.effects._effect import Effect
+from focgen.rig.effects._sizes import ZERO_OVER_SESSION
 
 EFFECT = Effect(
     name="sensor_drift",
@@ -11,5 +12,6 @@ EFFECT = Effect(
     reveals="the unloaded reading at the start and at the end, with the curvature logged",
     confused_with=("gain_drift", "creep", "sensor_relaxation"),
     needs=lambda e: None if e.duration > 10 else "the session is too short for a drift to show",
+    sizes=(ZERO_OVER_SESSION,),
     forms=_trends.forms("reading", 1, lambda x, trend: x + trend),
 )

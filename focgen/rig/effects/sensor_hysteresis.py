@@ -2,6 +2,7 @@
 
 from focgen.rig.effects import _loops
 from focgen.rig.effects._effect import Effect
+from focgen.rig.effects._sizes import WIDEST_LOOP
 
 EFFECT = Effect(
     name="sensor_hysteresis",
@@ -11,5 +12,6 @@ EFFECT = Effect(
     confused_with=("hysteresis", "valve_stiction", "sensor_relaxation", "sensor_nonlinearity"),
     needs=lambda e: None if e.reversals or e.unloads else "the input never turns round",
     remembers=True,
+    sizes=(WIDEST_LOOP,),
     forms=_loops.forms("strain"),
 )

@@ -6,6 +6,7 @@ from focgen.arrays import Array
 from focgen.fractional.transfer import Polynomial
 from focgen.rig.effects import _curves
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
+from focgen.rig.effects._sizes import BOW
 
 
 def _folded(x: Array, values: Values, run: Run) -> Array:
@@ -31,6 +32,7 @@ EFFECT = Effect(
     needs=lambda e: None if e.levels >= 3 else "needs three or more levels",
     bends=True,
     static=True,
+    sizes=(BOW,),
     forms=[
         *_curves.calibration("strain"),
         Form(

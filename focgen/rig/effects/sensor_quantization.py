@@ -6,6 +6,7 @@ from focgen.arrays import Array
 from focgen.rig import kernels
 from focgen.rig.effects._effect import STEP, Effect, Form, Parameter, Run, Values
 from focgen.rig.effects._levels import seen
+from focgen.rig.effects._sizes import own
 
 
 def _round(x: Array, values: Values, run: Run) -> Array:
@@ -36,6 +37,7 @@ EFFECT = Effect(
     reveals="slow ramps: the reading moves in steps of one size",
     confused_with=("valve_stiction",),
     needs=lambda e: None,
+    sizes=(own("step"),),
     forms=[
         Form("rounding", "reading", _STEPS, _round, seen=seen),
         Form(

@@ -6,6 +6,7 @@ from focgen.arrays import Array, Complex
 from focgen.rig import kernels
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 from focgen.rig.effects._lags import lag_response
+from focgen.rig.effects._sizes import HALF_GONE, OVERSHOOT
 
 _SHARE = Parameter("share", lower=0.0, upper=3.0, starts=(0.1, 0.1, 0.1), zero=0.0)
 # of a reading right at once, which is too low at rest: the gain that is given may be either
@@ -76,6 +77,7 @@ EFFECT = Effect(
     confused_with=("creep", "sensor_lag", "sensor_drift", "sensor_hysteresis"),
     slow=True,
     needs=lambda e: None if e.hold > 3 else "no hold is long beside the rig's response",
+    sizes=(OVERSHOOT, HALF_GONE),
     forms=[
         Form("one_time", "strain", (_SHARE, _TIME), _one, response=_one_response),
         Form("spread", "strain", (_SHARE, _TIME), _spread, response=_spread_response),

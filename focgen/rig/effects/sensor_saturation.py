@@ -5,6 +5,7 @@ import numpy as np
 from focgen.arrays import Array
 from focgen.rig.effects._curves import softly_beyond
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
+from focgen.rig.effects._sizes import own
 
 _LIMIT = Parameter("limit", level=1, lower=0.1, upper=1.3, starts=(0.9, 0.6), zero=1.3)
 _WIDTH = Parameter("width", level=1, lower=1e-3, upper=0.3, starts=(0.02, 0.05), log=True)
@@ -34,6 +35,7 @@ EFFECT = Effect(
     confused_with=("contact", "sensor_nonlinearity", "supply_saturation"),
     needs=lambda e: None if e.levels >= 3 else "needs three or more levels",
     static=True,
+    sizes=(own("limit"),),
     forms=[
         Form("hard", "reading", (_LIMIT,), _hard),
         # a converter ends on both sides of its zero

@@ -5,6 +5,7 @@ import numpy as np
 from focgen.arrays import Array
 from focgen.rig.effects import _curves
 from focgen.rig.effects._effect import LARGEST, Act, Effect, Form, Leaves, Parameter, Run, Values
+from focgen.rig.effects._sizes import GAIN_AFTER_SESSION
 
 _GROWTH = Parameter("growth", lower=0.0, upper=3.0, starts=(0.1, 0.1), zero=0.0)
 
@@ -64,6 +65,7 @@ EFFECT = Effect(
     reveals="a level before and after a higher one, steps in mixed order",
     confused_with=("gain_nonlinearity", "gain_drift", "creep"),
     needs=lambda e: None if e.revisits else "no level is reached before and after a higher one",
+    sizes=(GAIN_AFTER_SESSION,),
     forms=[
         Form(
             "largest",

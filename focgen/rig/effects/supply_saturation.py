@@ -9,6 +9,7 @@ from focgen.rig import kernels
 from focgen.rig.dynamics import Dynamics
 from focgen.rig.effects._curves import softly_beyond
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
+from focgen.rig.effects._sizes import own
 
 _CEILING = Parameter("ceiling", level=1, lower=0.1, upper=1.3, starts=(0.95, 0.75), zero=1.3)
 _WIDTH = Parameter("width", level=1, lower=1e-3, upper=0.3, starts=(0.03, 0.05), log=True)
@@ -65,6 +66,7 @@ EFFECT = Effect(
     confused_with=("gain_nonlinearity", "leak", "contact", "sensor_saturation"),
     needs=lambda e: None if e.levels >= 3 else "needs three or more levels",
     static=True,
+    sizes=(own("ceiling"),),
     forms=[
         Form("hard", "supply", (_CEILING,), _hard),
         # a chamber that fills from its supply comes to rest there as slowly as anywhere

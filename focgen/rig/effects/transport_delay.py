@@ -5,6 +5,7 @@ import numpy as np
 from focgen.arrays import Array
 from focgen.rig.delay import delayed
 from focgen.rig.effects._effect import DELAY, Effect, Form, Parameter, Run, Values
+from focgen.rig.effects._sizes import own
 
 
 def _shift(x: Array, values: Values, run: Run) -> Array:
@@ -18,6 +19,7 @@ EFFECT = Effect(
     reveals="steps and fast sines: a phase that falls in proportion to frequency, with no loss of amplitude",
     confused_with=("slow_regulator", "sensor_lag", "valve_asymmetry"),
     needs=lambda e: None if e.fastest < 0.25 else "no change of the input is fast beside the rig's response",
+    sizes=(own("delay"),),
     forms=[
         Form(
             "delay",

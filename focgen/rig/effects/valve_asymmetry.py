@@ -10,6 +10,7 @@ from focgen.rig.dynamics import Dynamics, Flow, Throat
 from focgen.rig.effects._effect import Effect, Form, Parameter, Run, Values
 from focgen.rig.effects._lags import PACE, RATE, THROAT, rising, two_paced
 from focgen.rig.effects._pumps import given
+from focgen.rig.effects._sizes import DOWN_OVER_UP
 
 _SPEED = Parameter("venting_speed", lower=0.05, upper=20.0, starts=(0.7, 2.0), zero=1.0, log=True)
 
@@ -58,6 +59,7 @@ EFFECT = Effect(
     reveals="steps up and down between the same levels, with the pressure logged",
     confused_with=("slow_regulator", "flow_limit", "unloading_asymmetry", "transport_delay"),
     needs=lambda e: None if e.unloads else "the input never falls: release it as well",
+    sizes=(DOWN_OVER_UP,),
     forms=[
         # the lag that fills and vents is the regulator's own
         two_paced("chamber", "venting_speed"),

@@ -9,6 +9,7 @@ import numpy as np
 from focgen.arrays import Array
 from focgen.rig import kernels
 from focgen.rig.effects._effect import PLACE, Effect, Form, Parameter, Run, Values
+from focgen.rig.effects._sizes import LOST_TRAVEL
 
 _BANDS = tuple(0.003 * 1.3**k for k in range(20))  # of the largest command, far above whose swing it may lie
 # many slips in a row fit no band but theirs, within a few hundredths
@@ -83,6 +84,7 @@ EFFECT = Effect(
     confused_with=("hysteresis", "dead_zone", "valve_asymmetry", "sensor_quantization"),
     needs=lambda e: None if e.reversals else "the input never turns round above zero",
     remembers=True,
+    sizes=(LOST_TRAVEL,),
     forms=[
         Form("play", "command", (_BAND,), _play),
         # a pump's spindle or gear lies behind what it adds up

@@ -1,0 +1,194 @@
+"""How large an effect is, as one would measure it on the rig: the same number whichever form was found.
+
+A size is a parameter that all forms have, as a ceiling, or is read off the stage on a
+:class:`~focgen.rig.bench.Bench`, run with the effect and without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from focgen.arrays import Array
+
+_LEVELS = 25  # of a staircase, from the lowest input to the highest
+_FINE, _COARSE = 40, 10  # samples in a response time
+_SETTLED = 12  # response times at a level
+_LONG = 40  # response times of a step
+_RAMP, _TOPS = 2001, 24  # samples of a slow ramp, and heights that it turns round at
+_STIRS = 1e-6  # of a ramp's height: an output that moves by more has begun to move
+_LOW = 0.03  # of the way from the lowest input to the highest: a load that changes nothing by itself
+_ALIKE = 0.02  # of the larger: two lags that are no further apart are one
+_MOVES = 1e-9  # of the larger: of a stage that moves by less nothing is read off
+
+
+@dataclass(frozen=True)
+class Size:
+    """One number that an effect is as large as. ``what`` it is, as a noun, with the times of a hold that it
+    is read at; ``unit``: "in" or "out" of the stage, with "/s" behind it where it is a rate, or a plain unit;
+    ``read`` off a bench, NaN where this form or this rig has none; ``own``: instead, parameters of which the
+    first that a form has is the size. ``signed``: its sign is that of what leaves the stage."""
+
+    what: str
+    unit: str = ""
+    read: Callable[[Any], float] | None = None
+    own: tuple[str, ...] = ()
+    signed: bool = False
+
+
+def own(name: str, what: str = "", *others: str) -> Size:
+    """A parameter of the forms, in its own unit."""
+    return Size(what or name, own=(name, *others))
+
+
+def _step(bench: Any, up: bool = True, fine: int = _FINE, long: int = _LONG) -> tuple[Array, Array, float]:
+    """The response to a step over the range of the input, with the effect and without, and its sample time,
+    s."""
+    begin, end = (bench.low, bench.high) if up else (bench.high, bench.low)
+    x = np.r_[begin, np.full(fine * long, end)]
+    h = bench.response / fine
+    return bench.run(x, h), bench.run(x, h, False), h
+
+
+def _mean_time(y: Array, h: float) -> float:
+    """The mean time of a response to a step, s: its area above what it has not reached yet."""
+    way = y[-1] - y[0]
+    return float(np.sum(y[-1] - y[1:]) * h / way) if abs(way) > _MOVES * np.max(np.abs(y)) else np.nan
+
+
+def _further_lag(bench: Any, up: bool = True) -> float:
+    with_it, without, h = _step(bench, up)
+    return _mean_time(with_it, h) - _mean_time(without, h)
+
+
+def _further_lag_down(bench: Any) -> float:
+    """NaN where it is the same on the way up."""
+    up, down = (_further_lag(bench, way) for way in (True, False))
+    return down if abs(down - up) > _ALIKE * max(abs(down), abs(up)) else np.nan
+
+
+def _down_over_up(bench: Any) -> float:
+    (up, _, h), (down, _, _) = (_step(bench, way) for way in (True, False))
+    return _mean_time(down, h) / _mean_time(up, h)
+
+
+def _highest_rate(bench: Any) -> float:
+    with_it, _, h = _step(bench, fine=_FINE * 5, long=_SETTLED)
+    return float(np.max(np.abs(np.diff(with_it)))) / h
+
+
+def _staircase(bench: Any, levels: Array) -> tuple[Array, Array]:
+    """What the levels come to, with the effect and without."""
+    held = _SETTLED * _COARSE
+    x, h = np.r_[levels[0], np.repeat(levels, held)], bench.response / _COARSE
+    return tuple(bench.run(x, h, effect)[held::held] for effect in (True, False))
+
+
+def _widest_loop(bench: Any) -> float:
+    """Up and down twice: the second way round is a closed loop."""
+    way = np.linspace(bench.low, bench.high, _LEVELS)
+    made = _staircase(bench, np.r_[way, way[-2::-1], way[1:], way[-2::-1]])
+    (with_it, without) = (y[-2 * _LEVELS + 1 :] for y in made)
+    wide = [y[: _LEVELS - 1] - y[: _LEVELS - 1 : -1] for y in (with_it, without)]
+    return float(np.max(np.abs(wide[0] - wide[1])))
+
+
+def _bow(bench: Any) -> float:
+    """By how much the static curve bends away from the nominal one between the same ends, at most."""
+    with_it, without = (y - y[0] for y in _staircase(bench, np.linspace(bench.low, bench.high, _LEVELS)))
+    if abs(without[-1]) <= _MOVES * np.max(np.abs(without)):
+        return np.nan
+    bent = with_it - without * with_it[-1] / without[-1]
+    return float(bent[np.argmax(np.abs(bent))])
+
+
+def _lost(bench: Any) -> float:
+    with_it, without = (y[-1] for y in _staircase(bench, np.array([bench.low, bench.high])))
+    return 100.0 * float(1.0 - with_it / without) if without else np.nan
+
+
+def _lost_travel(bench: Any) -> float:
+    """Of several turns the least: a valve that slips has more or less of its band left as it turns."""
+    least = np.inf
+    for top in bench.low + (bench.high - bench.low) * np.linspace(0.5, 1.0, _TOPS):
+        way = np.linspace(bench.low, top, _RAMP)
+        y = bench.alone(np.r_[way, way[-2::-1]])[_RAMP - 1 :]
+        stirs = np.flatnonzero(np.abs(y - y[0]) > _STIRS * (bench.high - bench.low))
+        least = min(least, float(way[-1] - way[-1 - stirs[0]]) if len(stirs) else np.inf)
+    return least if np.isfinite(least) else np.nan
+
+
+def _further_creep(bench: Any) -> float:
+    """In a hold, beyond what the nominal chain does."""
+    early, late = bench.hold
+    h = early / (3 * _COARSE)
+    x = np.r_[bench.low, np.full(round(late / h) + 1, bench.high)]
+    ways = [
+        (y[-1] - y[3 * _COARSE]) / (y[3 * _COARSE] - y[0]) for y in (bench.run(x, h), bench.run(x, h, False))
+    ]
+    return 100.0 * float(ways[0] - ways[1])
+
+
+def _overshoot(bench: Any) -> Array:
+    with_it, without, _ = _step(bench)
+    way = with_it[-1] - with_it[0]
+    made: Array = 100.0 * (with_it - without * with_it[-1] / (without[-1] or np.nan)) / (way or np.nan)
+    return made
+
+
+def _largest_overshoot(bench: Any) -> float:
+    over = _overshoot(bench)
+    return float(over[np.argmax(np.abs(over))])
+
+
+def _half_gone(bench: Any) -> float:
+    over = np.abs(_overshoot(bench))
+    top = int(np.argmax(over))
+    later = np.flatnonzero(over[top:] < 0.5 * over[top])
+    return float(later[0]) * bench.response / _FINE if len(later) else np.nan
+
+
+def _gain_over_session(bench: Any) -> float:
+    x = np.r_[bench.low, np.full(_SETTLED * _COARSE, bench.high)]
+    h = bench.response / _COARSE
+    first, last = (bench.run(x, h, start=start) for start in (bench.begin, bench.end))
+    return 100.0 * float((last[-1] - last[0]) / (first[-1] - first[0]) - 1.0)
+
+
+def _zero_over_session(bench: Any) -> float:
+    x, h = np.full(3, bench.low), bench.response / _COARSE
+    first, last = (bench.run(x, h, start=start) for start in (bench.begin, bench.end))
+    return float(last[-1] - first[-1])
+
+
+def _gain_after_session(bench: Any) -> float:
+    """Of a small load, ahead of all that was done and behind it."""
+    h, inputs = bench.step, bench.inputs
+    load = bench.low + _LOW * (bench.high - bench.low)
+    hold = np.full(min(int(_SETTLED * bench.response / h) + 2, len(inputs)), load)
+    x = np.r_[bench.low, hold, inputs, hold]
+    ratios = []
+    for effect in (True, False):
+        y = bench.run(x, h, effect)
+        ratios.append((y[-1] - y[0]) / (y[len(hold)] - y[0]))
+    return 100.0 * float(ratios[0] / ratios[1] - 1.0)
+
+
+LATER = Size("further lag", "s", _further_lag)
+LATER_DOWN = Size("further lag on the way back", "s", _further_lag_down)
+DOWN_OVER_UP = Size("time to unload over time to load", "", _down_over_up)
+HIGHEST_RATE = Size("highest rate", "out/s", _highest_rate)
+WIDEST_LOOP = Size("widest loop", "out", _widest_loop)
+BOW = Size("bow of the static curve", "out", _bow, signed=True)
+LOST = Size("lost at the highest input", "%", _lost)
+LOST_TRAVEL = Size("travel lost at a turn", "in", _lost_travel)
+FREQUENCY = Size("frequency", "Hz", lambda bench: 1.0 / bench.number("period"))
+FURTHER_CREEP = Size("more from {early:g} s to {late:g} s of a hold", "%", _further_creep)
+OVERSHOOT = Size("overshoot of a step", "%", _largest_overshoot)
+HALF_GONE = Size("half of it gone after", "s", _half_gone)
+GAIN_OVER_SESSION = Size("change of the gain over the session", "%", _gain_over_session)
+ZERO_OVER_SESSION = Size("change of the zero over the session", "out", _zero_over_session, signed=True)
+GAIN_AFTER_SESSION = Size("change of the gain at small loads by the session", "%", _gain_after_session)

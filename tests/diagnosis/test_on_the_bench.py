@@ -1,0 +1,118 @@
+"""The sizes that a diagnosis tells: those of the rig that made the logs, in the log's units.
+
+Red when a size is not the rig's, its interval holds no doubt of the form, or its sign is not that of the log.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from focgen.diagnosis.diagnose import diagnose
+from focgen.diagnosis.model import Candidate, Estimate, Found
+from focgen.diagnosis.turned import _signed
+from focgen.diagnosis.verdict.on_the_bench import seen_as
+from focgen.diagnosis.verdict.sizes import _counted
+from focgen.fractional.transfer import TransferFunction
+from focgen.logs.experiment import Experiment
+from focgen.rig.rig import Actuator, Rig, Signals
+from focgen.rig.turned import Turn
+
+H, COUNT = 0.05, 2400
+LAG = TransferFunction([(0.5, 0.0)], [(0.2, 1.0), (1.0, 0.0)])
+
+
+def rig(sensor=1.0):
+    columns = Signals("t_s", "angle_deg", "u_V", "p_bar")
+    reads = TransferFunction([(sensor, 0.0)], [(1.0, 0.0)])
+    return Rig("finger", H, columns, Actuator(0.8, 1.0, (12.0 / sensor,)), regulator=LAG, sensor=reads)
+
+
+def command():
+    rng = np.random.default_rng(2)
+    steps = np.repeat(np.ravel([(0.0, up) for up in rng.uniform(0.5, 4.0, 40)]), 30)[:COUNT]
+    slow = 2.0 - 2.0 * np.cos(np.arange(COUNT) * H / 6.0)
+    return np.where(np.arange(COUNT) < COUNT // 2, steps, slow)
+
+
+def lagged(x, tau, gain=1.0):
+    """A lag of ``x``, held between samples: by a step of its own closed form."""
+    kept, y = np.exp(-H / tau), np.zeros(len(x))
+    for k in range(1, len(x)):
+        y[k] = kept * y[k - 1] + gain * (1.0 - kept) * x[k - 1]
+    return y
+
+
+def backlash(x, wide):
+    y = np.zeros(len(x))
+    for k in range(1, len(x)):
+        y[k] = min(max(y[k - 1], x[k] - wide), x[k] + wide)
+    return y
+
+
+def logs(band=0.0, bend=0.0, down=1.0):
+    """Of a finger whose valve has a play of half width ``band`` V, or whose angle bends by ``bend``."""
+    rng, u = np.random.default_rng(3), command()
+    pressure = lagged(backlash(u, band), 0.2, 0.5)
+    fine = np.interp(np.arange(COUNT * 10) / 10.0, np.arange(COUNT), pressure)
+    kept, angle = np.exp(-H / 10 / 0.8), np.zeros(COUNT * 10)
+    for k in range(1, COUNT * 10):
+        angle[k] = kept * angle[k - 1] + 12.0 * (1.0 - kept) * fine[k - 1]
+    output = angle[::10] * (1.0 + bend * (angle[::10] / 24.0))
+    signals = {
+        "command": u,
+        "pressure": pressure + rng.normal(0.0, 0.006, COUNT),
+        "output": down * (output + rng.normal(0.0, 0.08, COUNT)),
+    }
+    return [Experiment("session", H, signals)]
+
+
+def size(found, what):
+    (cause,) = found.causes
+    return cause.candidates[0].sizes[what]
+
+
+def test_the_travel_that_a_valve_loses_is_told_in_volts():
+    found = size(diagnose(rig(), logs(band=0.15), pictures=False), "travel lost at a turn")
+    assert found.unit == "V" and found.ci95[0] < 0.30 < found.ci95[1]
+    assert 0.04 < (found.ci95[1] - found.ci95[0]) / found.value < 0.2
+
+
+@pytest.mark.parametrize("down, sensor", [(1.0, 1.0), (-1.0, 1.0), (1.0, 0.2)])
+def test_a_bent_curve_is_told_as_the_log_has_it(down, sensor):
+    """A bend of a quarter at the top lies a sixteenth of the top below the line between the ends."""
+    rig_of = rig(sensor)
+    given = replace(rig_of, actuator=replace(rig_of.actuator, gain=(down * rig_of.actuator.gain[0],)))
+    found = size(diagnose(given, logs(bend=0.25, down=down), pictures=False), "bow of the static curve")
+    top = 24.0
+    assert found.unit == "deg" and down * found.value < 0.0
+    assert abs(found.value) == pytest.approx(top / 16.0, rel=0.1)
+    assert found.ci95[0] < found.value < found.ci95[1]
+
+
+def test_numbers_of_either_sign_are_turned_and_others_are_not():
+    known = {"bow of the static curve": Estimate(1.0, (0.9, 1.2), "deg")}
+    wide = {"widest loop": Estimate(1.0, (0.9, 1.2), "deg")}
+    causes = [
+        Candidate("gain_nonlinearity", "actuator", 0.9, "cubic", {}, 0.0, known),
+        Candidate("hysteresis", "actuator", 0.9, "play", {}, 0.0, wide),
+    ]
+    turn = Turn({"command": 1, "pressure": 1, "curvature": -1, "output": -1})
+    bent, loop = _signed(Found("actuator", tuple(causes), 0.5, (0.4, 0.6)), turn, rig()).candidates
+    assert bent.sizes == {"bow of the static curve": Estimate(-1.0, (-1.2, -0.9), "deg")}
+    assert loop.sizes == wide
+
+
+def test_what_leaves_an_actuator_is_told_as_the_output_shows_it_where_nothing_else_does():
+    assert seen_as("curvature", rig()) == "output" and seen_as("pressure", rig()) == "pressure"
+    logged = replace(rig(), signals=replace(rig().signals, curvature="k"))
+    assert seen_as("curvature", logged) == "curvature"
+    integrates = TransferFunction([(1.0, 0.0)], [(1.0, 1.0)])
+    assert seen_as("curvature", replace(rig(), sensor=integrates)) == "curvature"
+
+
+def test_a_step_is_known_to_half_a_level_over_the_span():
+    assert _counted([0.4, 0.5, 0.6], 10.0) == [0.4875, 0.5, 0.5125]
+    assert _counted([0.499, 0.5, 0.501], 10.0) == [0.499, 0.5, 0.501]
