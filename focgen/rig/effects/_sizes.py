@@ -53,15 +53,19 @@ def _step(bench: Any, up: bool = True, fine: int = _FINE, long: int = _LONG) -> 
     return bench.run(x, h), bench.run(x, h, False), h
 
 
-def _mean_time(y: Array, h: float) -> float:
-    """The mean time of a response to a step, s: its area above what it has not reached yet."""
-    way = y[-1] - y[0]
-    return float(np.sum(y[-1] - y[1:]) * h / way) if abs(way) > _MOVES * np.max(np.abs(y)) else np.nan
+def _to_go(bench: Any, y: Array, h: float, up: bool, effect: bool = True) -> Array:
+    """The part of its way that a response to a step has yet to go; it comes to rest where it would have
+    rested all along, for a springpot is long in coming there."""
+    end = bench.run(np.full(3, bench.high if up else bench.low), h, effect)[-1]
+    way = end - y[0]
+    made: Array = (end - y) / (way if abs(way) > _MOVES * np.max(np.abs(y)) else np.nan)
+    return made
 
 
 def _further_lag(bench: Any, up: bool = True) -> float:
+    """The area between both responses is the mean time by which one is later."""
     with_it, without, h = _step(bench, up)
-    return _mean_time(with_it, h) - _mean_time(without, h)
+    return float(np.sum(_to_go(bench, with_it, h, up) - _to_go(bench, without, h, up, False)) * h)
 
 
 def _further_lag_down(bench: Any) -> float:
@@ -70,9 +74,20 @@ def _further_lag_down(bench: Any) -> float:
     return down if abs(down - up) > _ALIKE * max(abs(down), abs(up)) else np.nan
 
 
+def _half_way(bench: Any, up: bool) -> float:
+    """When a response is half-way, s, of a step whose middle is half a sample behind its begin."""
+    y, _, h = _step(bench, up, _FINE * 5, _SETTLED)
+    left = _to_go(bench, y, h, up)
+    there = np.flatnonzero(left <= 0.5)
+    if not len(there) or not there[0]:
+        return np.nan
+    k = int(there[0])
+    return h * float(k - 0.5 - (0.5 - left[k]) / (left[k - 1] - left[k]))
+
+
 def _down_over_up(bench: Any) -> float:
-    (up, _, h), (down, _, _) = (_step(bench, way) for way in (True, False))
-    return _mean_time(down, h) / _mean_time(up, h)
+    """Half-way, for a springpot comes to rest nowhere soon."""
+    return _half_way(bench, False) / _half_way(bench, True)
 
 
 def _highest_rate(bench: Any) -> float:
