@@ -59,8 +59,7 @@ def _beside_response(values: Values, s: Complex) -> Complex:
     return 1.0 + share * (mode - 1.0) + quarter * s * period / (2.0 * np.pi) * mode
 
 
-# a sharp mode is found from close by only
-_STARTS = tuple(0.02 * 1.16**k for k in range(41))
+_STARTS = tuple(0.02 * 1.16**k for k in range(41))  # a sharp mode is found from close by only
 _PERIOD = Parameter(PERIOD, time=1, lower=0.002, upper=30.0, starts=_STARTS, log=True)
 _SWINGS = 0.8  # damping from which on a step overshoots by less than 1.5 %
 _DAMPING = Parameter("damping", lower=0.005, upper=0.3, starts=(0.1,), log=True)
