@@ -22,7 +22,7 @@ from focgen.logs.experiment import Experiment, check_output
 from focgen.logs.feedback import unlogged_reference
 from focgen.rig import kernels
 from focgen.rig.rig import UNITY, Rig
-from focgen.rig.within import by_regulator, course_within, is_quick, read_within
+from focgen.rig.within import by_regulator, course_within, is_quick, read_within, scaled_to
 
 _AT_REST = 0.02  # of the input's largest value: closer to 0 than this it starts at rest at 0
 _AWAY = 0.1  # of a step: nearer to one of its ends the input is at it
@@ -311,16 +311,8 @@ def _within(experiment: Experiment, rig: Rig, role: str, pressure: Array, before
     if role == "command":
         return before + by_regulator(regulator, step, command - before / regulator.dc_gain, 0.0)
     late = rig.delays.regulator - rig.lead
-    made = _scaled_to(pressure, by_regulator(regulator, step, command - command[0], late))
+    made = scaled_to(pressure, by_regulator(regulator, step, command - command[0], late))
     return read_within(pressure, made, np.arange(len(command)) == 0)
-
-
-def _scaled_to(readings: Array, made: Array) -> Array:
-    """What was made (7, n), with the gain and the zero that suit the readings (n,)."""
-    columns = np.column_stack([np.ones(len(readings)), made[-1]])
-    (zero, gain), *_ = np.linalg.lstsq(columns, readings, rcond=None)
-    found: Array = zero + gain * made
-    return found
 
 
 def _measured(experiment: Experiment, rig: Rig, closed: bool) -> tuple[Array, Bools]:

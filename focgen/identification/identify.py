@@ -12,6 +12,7 @@ import numpy as np
 from focgen.arguments import checked
 from focgen.custody import identified_from
 from focgen.errors import FitError, LogError, check_choice
+from focgen.identification.bent import turns_within
 from focgen.identification.caveats import effects_left_out, warnings_of
 from focgen.identification.digits import told_gain, told_value
 from focgen.identification.excitation import Excitation, is_driven
@@ -105,6 +106,7 @@ def identify(
     else:
         result = Identification((), None, new, {}, {}, (), ())
     result = replace(result, stages=found)
+    result = _sensor_again(result, experiments)
     warnings = effects_left_out(nominal) + doubts(nominal, experiments) + result.warnings
     notes = remarks_of(experiments, nominal, result) + told + result.notes
     result = replace(result, warnings=warnings, notes=notes)
@@ -118,6 +120,16 @@ def identify(
         }
         write_file(out, rig_text(result.rig) + identified_from(inputs, out, options), inputs)
     return result
+
+
+def _sensor_again(result: Identification, experiments: Sequence[Experiment]) -> Identification:
+    """With the sensor fitted anew, where its curvature turns within samples: what that does there is known
+    once the actuator is."""
+    rig = result.rig
+    if "sensor" not in result.stages or not turns_within(rig, experiments[0].sample_time):
+        return result
+    again = {"sensor": identify_stage(experiments, "sensor", rig.between, rig)}
+    return replace(result, rig=_with_stages(rig, again), stages=result.stages | again)
 
 
 def _read(logs: Logs, rig: Rig, first: float | None, last: float | None) -> tuple[Experiment, ...]:

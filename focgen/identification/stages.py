@@ -17,6 +17,7 @@ import numpy as np
 from focgen.arrays import Array
 from focgen.errors import FitError, check_choice
 from focgen.fractional.transfer import TransferFunction
+from focgen.identification.bent import driving
 from focgen.identification.between_samples import Tried, at_rest, is_far_likelier, likeliest_way, ways_of
 from focgen.identification.digits import told_value
 from focgen.identification.directions import UpDown, fit_directions
@@ -30,10 +31,10 @@ from focgen.identification.shapes import (
     fit_shapes,
     refit,
 )
-from focgen.identification.smoothed import without_noise
 from focgen.identification.stage_notes import notes_of
-from focgen.logs.between import Between, jumps_of
+from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
+from focgen.rig.rig import Rig
 
 _SIGNALS = {"regulator": ("command", "pressure"), "sensor": ("curvature", "output")}
 _FEWEST = 30  # samples
@@ -82,16 +83,19 @@ class StageFit:
         return [(np.arange(len(y)) * self.step, y, made) for y, made in pairs]
 
 
-def identify_stage(experiments: Sequence[Experiment], stage: str, between: Between | None = None) -> StageFit:
+def identify_stage(
+    experiments: Sequence[Experiment], stage: str, between: Between | None = None, ahead: Rig | None = None
+) -> StageFit:
     """Fit a regulator (command → pressure) or a sensor (curvature → output) to all experiments that log both.
 
-    ``between``: what the command does between its samples, None where the data are to show it. Raises
-    FitError where the logs do not determine the stage.
+    ``between``: what the command does between its samples, None where the data are to show it. ``ahead``: the
+    rig that makes the curvature, where that is known: it tells how a sensor is driven between readings.
+    Raises FitError where the logs do not determine the stage.
     """
     check_choice("--stages", stage, _SIGNALS, FitError)
     used = _usable(experiments, stage)
     step = used[0].sample_time
-    ways, made = _ways(used, stage, between), cache(lambda way: [_record(e, stage, way) for e in used])
+    ways, made = _ways(used, stage, between), cache(lambda way: [_record(e, stage, way, ahead) for e in used])
     _check(made(ways[0]), stage)
     rests = at_rest([e[_SIGNALS[stage][0]] for e in used])
     way = likeliest_way(ways, lambda way: _tried(made(way), step, way), rests)
@@ -197,11 +201,10 @@ def _ways(experiments: Sequence[Experiment], stage: str, given: Between | None) 
     return tuple(way for way in ways if way != Between.SMOOTH) or (Between.STRAIGHT,)
 
 
-def _record(experiment: Experiment, stage: str, between: Between) -> Record:
+def _record(experiment: Experiment, stage: str, between: Between, ahead: Rig | None) -> Record:
     hold = "zero" if between == Between.HELD else "linear"
     drive, measured = (np.asarray(experiment[role], float) for role in _SIGNALS[stage])
-    if stage == "sensor":
-        drive = without_noise(drive, jumps_of(drive))
+    drive = driving(experiment, ahead) if stage == "sensor" else drive
     rests = stage == "regulator" and np.ptp(drive) == 0.0 and bool(drive[0]) and _answers(measured)
     moves = not (rests or _still(drive, measured))
     drive = drive if rests else drive - drive[0]

@@ -50,6 +50,14 @@ def by_regulator(regulator: TransferFunction, step: float, command: Array, late:
     return made_within(lambda more: Convolution(regulator, step, delay=late + more).run(moved), step)
 
 
+def scaled_to(readings: Array, made: Array) -> Array:
+    """What was made (7, n), with the gain and the zero that suit the ``readings`` (n,)."""
+    columns = np.column_stack([np.ones(len(readings)), made[-1]])
+    (zero, gain), *_ = np.linalg.lstsq(columns, readings, rcond=None)
+    found: Array = zero + gain * made
+    return found
+
+
 def read_within(readings: Array, made: Array, first: Array) -> Array | None:
     """A signal that was read (n,) within its samples (7, n), from what was ``made`` (7, n) of the command:
     the rest in straight lines. ``first`` (n,): true where an experiment begins. None where the readings do

@@ -1,6 +1,6 @@
-"""A regulator with few samples in its time: the actuator behind it keeps its numbers.
+"""A stage with few samples in its time: what is behind it keeps its numbers.
 
-Red when T, alpha or K take up what the pressure does between its readings, or a lead is found in it.
+Red when T, alpha, K or a sensor's lag take up what a signal does between its readings, or a lead is found.
 """
 
 from __future__ import annotations
@@ -62,3 +62,33 @@ def test_the_actuator_behind_a_quick_regulator_keeps_its_numbers(command_of, alp
     assert found.actuator.alpha == pytest.approx(alpha, abs=0.006)
     assert np.polyval(found.actuator.gain[::-1], 1.65) == pytest.approx(GAIN, rel=0.006)  # the middle of it
     assert found.lead == 0.0
+
+
+def seen_by_a_sensor(alpha, time, lag):
+    """Two logs of an actuator whose curvature is logged ahead of a sensor's ``lag``, both exact."""
+    rng, logs = np.random.default_rng(3), []
+    actuator = TransferFunction([(2.0, 0.0)], [(time**alpha, alpha), (1.0, 0.0)])
+    den = [(time**alpha * lag, 1.0 + alpha), (lag, 1.0), (time**alpha, alpha), (1.0, 0.0)]
+    both = TransferFunction([(2.0, 0.0)], den)
+    for number in range(2):
+        command = staircase(rng)
+        signals = {"command": command}
+        for role, stage in (("curvature", actuator), ("output", both)):
+            signals[role] = Convolution(stage, H).run(command) + rng.normal(0.0, 0.018, COUNT)
+        logs.append(Experiment(f"e{number}", H, signals, start=900.0 * number))
+    return logs
+
+
+@pytest.mark.parametrize("samples", [0.6, 1.5])
+@pytest.mark.parametrize("alpha, time", [(0.5, 3.0), (0.7, 1.0)])
+def test_a_sensor_behind_a_springpot_keeps_its_lag(alpha, time, samples):
+    lag = samples * H
+    slow = TransferFunction([(1.0, 0.0)], [(lag, 1.0), (1.0, 0.0)])
+    given = Actuator(time**alpha, alpha, (2.0,))
+    rough = Rig("finger", H, Signals("t", "y", "u", None, "k"), given, sensor=slow)
+    logs = seen_by_a_sensor(alpha, time, lag)
+    found = identify(rough, logs, stages=("actuator", "sensor"), integer=False)
+    assert found.rig.sensor.den[0].coefficient == pytest.approx(lag, rel=0.04)
+    assert found.stages["sensor"].transfer == found.rig.sensor
+    alone = identify(rough, logs, stages=("sensor",), integer=False)  # behind the actuator of the file
+    assert alone.rig.sensor.den[0].coefficient == pytest.approx(lag, rel=0.04)

@@ -6,10 +6,14 @@ are taken to run as this one's.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from focgen.fractional.transfer import TransferFunction
+from focgen.rig.corners import kinks
+from focgen.rig.rig import Actuator, Rig, Signals
 from focgen.rig.within import (
     PLACES,
     by_regulator,
@@ -118,6 +122,13 @@ def test_readings_of_another_regulator_run_in_lines(tau):
     command = pulses(np.random.default_rng(4))
     readings = exact(command, tau, H * np.arange(COUNT))
     assert read_within(readings, by_regulator(lag(0.08), H, command, 0.0), np.arange(COUNT) == 0) is None
+
+
+def test_a_chain_turns_within_samples_where_all_of_it_is_quick():
+    rig = Rig("r", H, Signals("t", "y", "u"), Actuator(0.5, 0.6, (1.0,)), regulator=lag(0.1))
+    assert kinks(rig, ("regulator", "actuator"), H) and kinks(rig, ("regulator", "sensor"), H)
+    assert not kinks(rig, ("sensor",), H)  # which is 1
+    assert not kinks(replace(rig, regulator=lag(5.0)), ("regulator", "actuator"), H)
 
 
 def test_quick_is_what_is_through_with_its_way_in_few_samples():
