@@ -37,11 +37,14 @@ def driving(experiment: Experiment, rig: Rig | None) -> Array:
     run = Run.of([len(command)], [0.0], step)
     run.rest[0] = BALANCED  # logs begin at rest with their first command
 
-    def made(late: float) -> Array:
+    def made(late: float, way: Between = Between.HELD) -> Array:
         chain = Chain(replace(rig, lead=rig.lead - late, known=()))
-        return chain.run(command, "regulator", "actuator", run, Between.HELD)
+        return chain.run(command, *_AHEAD, run, way)
 
     first, model = np.arange(len(command)) == 0, scaled_to(read, made_within(made, step))
+    straight = scaled_to(read, made(0.0, Between.STRAIGHT)[None])[0]
+    if np.var(read - straight) < np.var(read - model[-1]):  # which is then not held
+        return plain
     curve = without_noise(read, jumps_of(read), model[-1])
     values = read_within(curve, model, first)
     return plain if values is None else curve + laid_on_samples(values, first)

@@ -16,6 +16,7 @@ from focgen.identification.bent import turns_within
 from focgen.identification.caveats import effects_left_out, warnings_of
 from focgen.identification.digits import told_gain, told_value
 from focgen.identification.excitation import Excitation, is_driven
+from focgen.identification.fed import fed
 from focgen.identification.form import lack_of_form
 from focgen.identification.fractional import FractionalFit
 from focgen.identification.gain import check_degree, r2_of_line
@@ -102,7 +103,9 @@ def identify(
     ranges, told = seen_ranges(nominal.ranges, experiments)
     new = _with_stages(replace(nominal, ranges=ranges, effects=()), found)
     if "actuator" in stages:
-        result = _actuator(experiments, others, new, gain_degree, delay, integer)
+        ahead, rival = fed(experiments, new, found.get("regulator"))
+        result = _actuator(experiments, others, ahead, rival, gain_degree, delay, integer)
+        result = replace(result, rig=_behind(result.rig, ahead, new))
     else:
         result = Identification((), None, new, {}, {}, (), ())
     result = replace(result, stages=found)
@@ -120,6 +123,16 @@ def identify(
         }
         write_file(out, rig_text(result.rig) + identified_from(inputs, out, options), inputs)
     return result
+
+
+def _behind(found: Rig, ahead: Rig, rig: Rig) -> Rig:
+    """The rig that was ``found`` behind what was ``ahead``, with the regulator of its file again."""
+    if ahead is rig:
+        return found
+    delays = replace(found.delays, regulator=rig.delays.regulator)
+    known = replace(found.uncertainty, regulator=rig.uncertainty.regulator)
+    own: dict[str, Any] = {"lead": rig.lead, "between": rig.between, "regulator": rig.regulator}
+    return replace(found, delays=delays, uncertainty=known, **own)
 
 
 def _sensor_again(result: Identification, experiments: Sequence[Experiment]) -> Identification:
@@ -162,17 +175,19 @@ def _actuator(
     experiments: Sequence[Experiment],
     others: Sequence[Experiment],
     rig: Rig,
+    rival: Rig | None,
     degree: int,
     delay: bool,
     integer: bool,
 ) -> Identification:
-    """The identification of the actuator; ``rig`` has the regulator and the sensor it is seen through."""
+    """The identification of the actuator; ``rig`` has the regulator and the sensor it is seen through, and
+    ``rival`` another regulator that may be."""
     if rig.delays.actuator and not delay:
         rig = replace(rig, delays=replace(rig.delays, actuator=0.0))
     check_alike(experiments, rig)
     driven = [e for e in experiments if is_driven(e)]
     used = driven or experiments
-    joined = joint_fit(used, rig, degree, delay)
+    joined = joint_fit(used, rig, degree, delay, rival)
     rig, found = joined.rig, joined.found
     excitations, fit = found.excitations, found.fit
     excitations = [x.bare() for x in excitations]  # a long log's spectra are large

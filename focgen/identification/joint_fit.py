@@ -33,15 +33,19 @@ class JointFit:
     lead: float = 0.0
 
 
-def joint_fit(used: Sequence[Experiment], rig: Rig, degree: int, delay: bool) -> JointFit:
+def joint_fit(
+    used: Sequence[Experiment], rig: Rig, degree: int, delay: bool, rival: Rig | None = None
+) -> JointFit:
     """The fit to the experiments ``used``. What the input was before them is found without a loop, and again
-    with one where the model lacks something.
+    with one where the model lacks something. ``rival``: a rig that may have driven them as well: the numbers
+    are known no better than they are apart by it.
 
     Raises FitError where the logs do not determine the parameters.
     """
     befores = befores_of(used, rig, degree + 1)
     try:
         made = _fit(used, befores, rig, degree, delay)
+        made = made if rival is None else _as_unsure(made, used, befores, rival, degree, delay)
     except FitError:
         if (looped := _looped_otherwise(used, befores, rig, degree, delay)) is None:
             raise
@@ -52,6 +56,16 @@ def joint_fit(used: Sequence[Experiment], rig: Rig, degree: int, delay: bool) ->
     if looped is None or (made.found.width and made.found.left <= looped.found.left):
         return made
     return looped
+
+
+def _as_unsure(
+    made: JointFit, used: Sequence[Experiment], befores: Befores, rival: Rig, degree: int, delay: bool
+) -> JointFit:
+    """A fit whose intervals reach to what it would be, were the ``rival`` what drove the experiments."""
+    fit, other = made.found.fit, _fit(used, befores, rival, degree, delay).found.fit
+    names = ("T", "alpha", "delay", "gain")[: 4 if len(fit.gain) == len(other.gain) else 3]
+    apart = {n: fit.half[n] + np.abs(getattr(fit, n) - getattr(other, n)) for n in names}
+    return replace(made, found=replace(made.found, fit=replace(fit, half=fit.half | apart)))
 
 
 def _looped_otherwise(

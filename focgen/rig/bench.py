@@ -58,29 +58,34 @@ class Bench:
         """A parameter of the effects by its name."""
         return self.placed[0].named[name]
 
+    @property
+    def top(self) -> float:
+        """The input of the session that is farthest from 0."""
+        return self.high if self.high >= -self.low else self.low
+
     def of(self, rig: Rig, values: Sequence[Sequence[float]]) -> Bench:
         """The same with other numbers of the rig and of the effects."""
         placed = tuple(replace(p, values=tuple(v)) for p, v in zip(self.placed, values))
         return replace(self, rig=rig, placed=placed)
 
-    def run(self, x: Array, h: float, effect: bool = True, start: float = 0.0) -> Array:
+    def run(self, x: Array, h: float, effect: bool = True, at: float | None = None) -> Array:
         """What leaves the stage when ``x`` (n,) enters, in lines between samples of ``h`` s, from equilibrium
-        with its first value; with the effects or without."""
+        with its first value; with the effects or without. ``at``: where the session's clock stands still."""
         rig = replace(self.rig, known=(), lead=0.0)
-        run = self._run_of(len(x), h, start)
+        run = self._run_of(len(x), h)
+        run = run if at is None else replace(run, clock=np.full(len(x), at))
         chain = Chain(rig, self.placed if effect else ())
         return chain.run(np.ascontiguousarray(x, float), self.stage, self.stage, run, Between.STRAIGHT)
 
     def alone(self, x: Array) -> Array:
         """What leaves the effects themselves, without the stage."""
-        run = replace(self._run_of(len(x), self.step, 0.0), rest=np.zeros(len(x), np.uint8))
-        run.rest[0] = 1
+        run = Run.of([len(x)], [0.0], self.step)
         for placed in self.placed:
             x = placed.act(x, run)
         return x
 
     @staticmethod
-    def _run_of(count: int, h: float, start: float) -> Run:
-        run = Run.of([count], [start], h)
+    def _run_of(count: int, h: float) -> Run:
+        run = Run.of([count], [0.0], h)
         run.rest[0] = BALANCED
         return run

@@ -22,7 +22,7 @@ _GAUSS, _SHARES = np.polynomial.legendre.leggauss(6)
 PLACES = 0.5 * (1.0 + np.r_[_GAUSS, 1.0])  # of a sample, 0 … 1, where a course within it is known
 _SHARES = 0.5 * _SHARES  # of a sample, that each but the last stands for
 _QUICK = 0.2  # of its way in two samples: a slower regulator is straight enough between them
-_FOLLOWS = 0.5  # of what lines miss: where readings are as far from the model, it does not tell more
+_FOLLOWS = 0.3  # of what lines miss: where readings are as far from the model, it does not tell more
 
 
 def is_quick(regulator: TransferFunction, step: float) -> bool:
@@ -44,10 +44,16 @@ def made_within(run: Callable[[float], Array], step: float) -> Array:
 
 def by_regulator(regulator: TransferFunction, step: float, command: Array, late: float) -> Array:
     """The same of a ``regulator`` that was at rest at 0, its ``command`` (n,) ``late`` s after its row."""
-    ahead = max(math.ceil(-late / step), 0)  # of a command that was sent before its row
-    moved = np.r_[command[ahead:], np.full(ahead, command[-1])] if ahead else command
-    late = max(late + ahead * step, 0.0)
-    return made_within(lambda more: Convolution(regulator, step, delay=late + more).run(moved), step)
+    sent, late = as_sent(command, step, late)
+    return made_within(lambda more: Convolution(regulator, step, delay=late + more).run(sent), step)
+
+
+def as_sent(command: Array, step: float, late: float) -> tuple[Array, float]:
+    """A ``command`` (n,) that comes ``late`` s after its row, whole samples sooner where that is before it,
+    and by how much it is late then, s."""
+    ahead = min(max(math.ceil(-late / step), 0), len(command))
+    sent = np.r_[command[ahead:], np.full(ahead, command[-1])] if ahead else command
+    return sent, max(late + ahead * step, 0.0)
 
 
 def scaled_to(readings: Array, made: Array) -> Array:

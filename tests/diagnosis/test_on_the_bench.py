@@ -6,6 +6,7 @@ Red when a size is not the rig's, its interval holds no doubt of the form, or it
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from focgen.diagnosis.diagnose import diagnose
 from focgen.diagnosis.model import Candidate, Estimate, Found
 from focgen.diagnosis.turned import _signed
 from focgen.diagnosis.verdict.on_the_bench import seen_as
-from focgen.diagnosis.verdict.sizes import _counted
+from focgen.diagnosis.verdict.sizes import _counted, spread
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
 from focgen.rig.rig import Actuator, Rig, Signals
@@ -75,7 +76,7 @@ def size(found, what):
 
 
 def test_the_travel_that_a_valve_loses_is_told_in_volts():
-    found = size(diagnose(rig(), logs(band=0.15), pictures=False), "travel lost at a turn")
+    found = size(diagnose(rig(), logs(band=0.15), pictures=False), "command lost at each reversal")
     assert found.unit == "V" and found.ci95[0] < 0.30 < found.ci95[1]
     assert 0.04 < (found.ci95[1] - found.ci95[0]) / found.value < 0.2
 
@@ -85,7 +86,7 @@ def test_a_bent_curve_is_told_as_the_log_has_it(down, sensor):
     """A bend of a quarter at the top lies a sixteenth of the top below the line between the ends."""
     rig_of = rig(sensor)
     given = replace(rig_of, actuator=replace(rig_of.actuator, gain=(down * rig_of.actuator.gain[0],)))
-    found = size(diagnose(given, logs(bend=0.25, down=down), pictures=False), "bow of the static curve")
+    found = size(diagnose(given, logs(bend=0.25, down=down), pictures=False), "bend of the static curve")
     top = 24.0
     assert found.unit == "deg" and down * found.value < 0.0
     assert abs(found.value) == pytest.approx(top / 16.0, rel=0.1)
@@ -93,7 +94,7 @@ def test_a_bent_curve_is_told_as_the_log_has_it(down, sensor):
 
 
 def test_numbers_of_either_sign_are_turned_and_others_are_not():
-    known = {"bow of the static curve": Estimate(1.0, (0.9, 1.2), "deg")}
+    known = {"bend of the static curve": Estimate(1.0, (0.9, 1.2), "deg")}
     wide = {"widest loop": Estimate(1.0, (0.9, 1.2), "deg")}
     causes = [
         Candidate("gain_nonlinearity", "actuator", 0.9, "cubic", {}, 0.0, known),
@@ -101,7 +102,7 @@ def test_numbers_of_either_sign_are_turned_and_others_are_not():
     ]
     turn = Turn({"command": 1, "pressure": 1, "curvature": -1, "output": -1})
     bent, loop = _signed(Found("actuator", tuple(causes), 0.5, (0.4, 0.6)), turn, rig()).candidates
-    assert bent.sizes == {"bow of the static curve": Estimate(-1.0, (-1.2, -0.9), "deg")}
+    assert bent.sizes == {"bend of the static curve": Estimate(-1.0, (-1.2, -0.9), "deg")}
     assert loop.sizes == wide
 
 
@@ -111,6 +112,33 @@ def test_what_leaves_an_actuator_is_told_as_the_output_shows_it_where_nothing_el
     assert seen_as("curvature", logged) == "curvature"
     integrates = TransferFunction([(1.0, 0.0)], [(1.0, 1.0)])
     assert seen_as("curvature", replace(rig(), sensor=integrates)) == "curvature"
+
+
+def fit_of(information, low, high):
+    """A fit of two numbers behind one nuisance, of a hundred innovations of square 1."""
+    candidate = SimpleNamespace(form=SimpleNamespace(parameters=("one", "two")))
+    problem = SimpleNamespace(candidates=(candidate,), head=1, nominal_start=np.zeros(0))
+    problem.bounds = lambda: (np.array(low, float), np.array(high, float))
+    innovations = np.ones(103)
+    return SimpleNamespace(
+        problem=problem, vector=np.zeros(3), innovations=innovations, sse=100.0, information=information
+    )
+
+
+def test_what_is_not_known_is_not_known_beside_a_number_that_cannot_move():
+    """A nuisance without room was one of no variance, and all that was less sure passed for known."""
+    little = np.diag([1.0, 0.005, 4.0])
+    for room in (0.0, 1.0):
+        places, covariance = spread(fit_of(little, [0.0, -9.0, -9.0], [room, 9.0, 9.0]), [0])
+        assert places == [1, 2]
+        np.testing.assert_allclose(np.diag(covariance), [200.0, 0.25])
+
+
+def test_a_nuisance_is_no_further_off_than_it_may_be():
+    """A gauge that would be anything, and looks like the first number, may be off by one at most."""
+    alike = np.array([[50.0, 50.0, 0.0], [50.0, 50.0, 0.0], [0.0, 0.0, 4.0]])
+    _, covariance = spread(fit_of(alike, [-1.0, -9.0, -9.0], [1.0, 9.0, 9.0]), [0])
+    assert covariance[0, 0] == pytest.approx(1.0 / 50.0 + 4.0 / 12.0, rel=1e-6)
 
 
 def test_a_step_is_known_to_half_a_level_over_the_span():

@@ -92,3 +92,40 @@ def test_a_sensor_behind_a_springpot_keeps_its_lag(alpha, time, samples):
     assert found.stages["sensor"].transfer == found.rig.sensor
     alone = identify(rough, logs, stages=("sensor",), integer=False)  # behind the actuator of the file
     assert alone.rig.sensor.den[0].coefficient == pytest.approx(lag, rel=0.04)
+
+
+def test_a_command_that_is_not_held_is_asked_of_the_pressure():
+    """A file that says nothing of it is taken for held elsewhere: T was 7 % too long then."""
+    lag = TransferFunction([(1.1, 0.0)], [(0.04, 1.0), (1.0, 0.0)])
+    plant = TransferFunction([(GAIN, 0.0)], [(T, 1.0), (1.0, 0.0)])
+    fine, rng, logs = 10, np.random.default_rng(6), []
+    for number in range(2):
+        phases = 2.0 * np.pi * np.outer(np.arange(COUNT * fine) * H / fine, [0.02, 0.05])
+        command = 1.5 + 0.4 * np.sin(phases + rng.uniform(0.0, 6.0, 2)).sum(1)
+        pressure = 1.1 * command[0] + Convolution(lag, H / fine, "linear").run(command - command[0])
+        output = GAIN * pressure[0] + Convolution(plant, H / fine, "linear").run(pressure - pressure[0])
+        signals = {"command": command[::fine], "pressure": pressure[::fine] + rng.normal(0.0, 0.009, COUNT)}
+        signals["output"] = output[::fine] + rng.normal(0.0, 0.006, COUNT)
+        logs.append(Experiment(f"e{number}", H, signals, start=900.0 * number))
+    rough = Rig("finger", H, SIGNALS[True], Actuator(T, 1.0, (GAIN,)), regulator=lag)
+    found = identify(rough, logs, integer=False).joint
+    assert found.ci95["T"][0] < T < found.ci95["T"][1] and found.T == pytest.approx(T, rel=0.02)
+
+
+@pytest.mark.parametrize("wrong", [0.5, 3.0])
+def test_a_regulator_of_the_file_that_the_pressure_contradicts_tells_nothing(wrong):
+    said = TransferFunction([(1.1, 0.0)], [(wrong * 0.08, 1.0), (1.0, 0.0)])
+    rough = Rig("finger", H, SIGNALS[True], Actuator(T, 0.7, (GAIN,)), regulator=said)
+    found = identify(rough, logs_of(staircase, 0.08, 0.7, True), integer=False)
+    assert found.rig.actuator.T ** (1.0 / found.rig.actuator.alpha) == pytest.approx(T, rel=0.01)
+    assert found.rig.regulator == said and found.rig.lead == 0.0  # --stages does not name it
+
+
+def test_where_a_lag_and_a_dead_time_look_alike_T_is_known_no_better_than_they_are_apart():
+    """The pressure is there at the next reading either way: it came at once, or within the sample."""
+    at_once = TransferFunction([(1.1, 0.0)], [(0.002, 1.0), (1.0, 0.0)])
+    rough = Rig("finger", H, SIGNALS[True], Actuator(T, 1.0, (GAIN,)), regulator=at_once)
+    found = identify(rough, logs_of(staircase, 0.002, 1.0, True), integer=False)
+    low, high = found.joint.ci95["T"]
+    assert found.rig.actuator.T == pytest.approx(T, rel=0.02) and high - low > 0.2
+    assert found.rig.uncertainty.actuator.time > 0.05

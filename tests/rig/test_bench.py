@@ -50,11 +50,11 @@ CASES = [
     ("slow_regulator", "one_lag", (0.3,), {"further lag": 0.3}),
     ("slow_regulator", "two_lags", (0.3,), {"further lag": 0.6}),
     ("flow_limit", "hard", (1.5,), {"highest rate": 1.5}),
-    ("leak", "laminar", (0.1,), {"lost at the highest input": 10.0}),
+    ("leak", "laminar", (0.1,), {"share lost at the highest input": 10.0}),
     ("valve_asymmetry", "speed", (0.4,), {"time to unload over time to load": 2.5}),
     ("unloading_asymmetry", "speed", (0.5,), {"time to unload over time to load": 2.0}),
-    ("valve_stiction", "play", (0.1,), {"travel lost at a turn": 0.2}),
-    ("valve_stiction", "stick_slip", (0.1, 0.5), {"travel lost at a turn": 0.15}),
+    ("valve_stiction", "play", (0.1,), {"command lost at each reversal": 0.2}),
+    ("valve_stiction", "stick_slip", (0.1, 0.5), {"command lost at each reversal": 0.15}),
     ("hysteresis", "play", (0.3,), {"widest loop": 0.6}),
     ("sensor_hysteresis", "play", (0.3,), {"widest loop": 0.6}),
     ("resonance", "series", (0.5, 0.05), {"frequency": 2.0}),
@@ -65,7 +65,7 @@ CASES = [
         "sensor_relaxation",
         "one_time",
         (0.3, 4.0),
-        {"overshoot of a step": 30.0, "half of it gone after": 4.0 * np.log(2.0)},
+        {"overshoot of a step": 30.0, "overshoot half gone after": 4.0 * np.log(2.0)},
     ),
 ]
 
@@ -91,18 +91,36 @@ def test_a_lag_of_one_way_is_told_on_that_way():
 @pytest.mark.parametrize("form, values", [("quadratic", (0.05,)), ("exponential", (0.1,))])
 def test_a_bow_is_the_farthest_from_the_line_between_the_ends(form, values):
     bench = bench_of("sensor_nonlinearity", form, *values)
-    curve = bench.placed[0].act(LEVELS, bench._run_of(len(LEVELS), H, 0.0))
+    curve = bench.placed[0].act(LEVELS, bench._run_of(len(LEVELS), H))
     assert abs(bow(curve)) > 0.02
-    assert sizes(bench)["bow of the static curve"] == pytest.approx(bow(curve), rel=0.01)
+    assert sizes(bench)["bend of the static curve"] == pytest.approx(bow(curve), rel=0.01)
 
 
 def test_softening_is_told_of_a_load_that_softens_nothing_itself():
     found = sizes(bench_of("softening", "saturating", 0.3, 2.0))
     # what bends by 6 under the largest load has grown by 0.3 (1 - exp(-3)), and by a small one by little
     grown = [1 + 0.3 * -np.expm1(-largest / 2.0) for largest in (2.0 * TOP, 0.03 * 2.0 * TOP)]
-    assert found["change of the gain at small loads by the session"] == pytest.approx(
+    assert found["change over the session of the gain for small loads"] == pytest.approx(
         100.0 * (grown[0] / grown[1] - 1.0), rel=0.05
     )
+
+
+@pytest.mark.parametrize("input_of", [lambda x: x, lambda x: TOP + 0.0 * x, lambda x: 2.0 + x / TOP])
+def test_a_drift_of_the_gain_is_told_of_any_input(input_of):
+    bench = bench_of("gain_drift", "linear", 1e-3)
+    bench = replace(bench, inputs=input_of(bench.inputs))
+    assert sizes(bench)["change of the gain over the session"] == pytest.approx(20.0, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "effect, form, values", [("leak", "turbulent", (0.1,)), ("softening", "largest", (0.2, 3.0))]
+)
+def test_loads_below_0_are_told_as_their_like_above(effect, form, values):
+    bench = bench_of(effect, form, *values)
+    ((what, told),) = sizes(bench).items()
+    assert told > 1.0
+    for inputs in (-bench.inputs, np.r_[0.01, -bench.inputs]):
+        assert sizes(replace(bench, inputs=inputs))[what] == pytest.approx(told, rel=0.02)
 
 
 def test_every_form_of_every_family_has_a_size():

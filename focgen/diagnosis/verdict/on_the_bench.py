@@ -44,12 +44,15 @@ class _Found:
         """Half of a size's 95 % interval, from the covariance of its parameters and the rig's own: what a
         curve has more of than the gain has less is no doubt of its bow."""
         places, covariance = spread(self.of, self.which, own=True)
+        low, high = self.of.problem.bounds()
         slopes = np.zeros(len(places))
         for i, (place, variance) in enumerate(zip(places, np.diag(covariance))):
             if variance > 0.0:
-                step, moved = _NUDGE * np.sqrt(variance), self.of.vector.copy()
+                moved, step = self.of.vector.copy(), _NUDGE * float(np.sqrt(variance))
+                above, below = high[place] - moved[place], moved[place] - low[place]
+                step = min(step, above) if above >= min(step, below) else -min(step, below)
                 moved[place] += step
-                slopes[i] = (self.read(size, moved) - value) / step
+                slopes[i] = (self.read(size, moved) - value) / step if step else 0.0
         return float(1.96 * np.sqrt(max(slopes @ covariance @ slopes, 0.0)))
 
 

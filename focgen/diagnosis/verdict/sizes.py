@@ -61,12 +61,21 @@ def spread(of: Fit, which: Sequence[int], own: bool = False) -> tuple[list[int],
         count = len(candidate.form.parameters)
         places += range(place, place + count) if number in which else ()
         place += count
+    return places, _covariance(of)[np.ix_(places, places)]
+
+
+def _covariance(of: Fit) -> np.ndarray:
+    """Of all numbers of a fit; none of those that cannot move."""
     sigma = of.sse / max(len(of.innovations) - len(of.vector), 1)
     low, high = of.problem.bounds()
-    within = 12.0 / np.maximum(high - low, FIXED) ** 2  # 1/variance of what may be anything between two ends
-    within[: len(of.problem.nominal_start)] = within[of.problem.head :] = 0.0
-    known = of.information + sigma * np.diag(within)
-    return places, np.linalg.pinv(known)[np.ix_(places, places)] * sigma
+    free = np.flatnonzero(high - low > FIXED)
+    within = 12.0 / (high - low)[free] ** 2  # 1/variance of what may be anything between two ends
+    within[(free < len(of.problem.nominal_start)) | (free >= of.problem.head)] = 0.0
+    known = of.information[np.ix_(free, free)] + sigma * np.diag(within)
+    scale = np.sqrt(np.maximum(np.diag(known), 1e-300))
+    made = np.zeros((len(of.vector), len(of.vector)))
+    made[np.ix_(free, free)] = sigma * np.linalg.pinv(known / np.outer(scale, scale)) / np.outer(scale, scale)
+    return made
 
 
 def at_their_ends(rival: Rival) -> tuple[str, ...]:

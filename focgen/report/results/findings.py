@@ -61,10 +61,11 @@ def _candidates(found: Diagnosis) -> Rows:
         for one in cause.candidates:
             head: dict[str, Any] = {"cause": number_of, "stage": cause.stage, "effect": one.effect}
             head |= {"confidence": one.confidence, "shrink": cause.shrink}
-            for name, estimate in (*one.sizes.items(), *one.parameters.items()):
+            known = one.sizes | {k: e for k, e in one.parameters.items() if k not in one.sizes}
+            for name, estimate in known.items():
                 size = {"value": estimate.value, "low": estimate.ci95[0], "high": estimate.ci95[1]}
                 rows.append(head | {"parameter": name} | size | {"unit": estimate.unit})
-            if not one.parameters:
+            if not known:
                 rows.append(head | {"parameter": None})
     return rows
 

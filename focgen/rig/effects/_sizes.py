@@ -20,7 +20,7 @@ _SETTLED = 12  # response times at a level
 _LONG = 40  # response times of a step
 _RAMP, _TOPS = 2001, 24  # samples of a slow ramp, and heights that it turns round at
 _STIRS = 1e-6  # of a ramp's height: an output that moves by more has begun to move
-_LOW = 0.03  # of the way from the lowest input to the highest: a load that changes nothing by itself
+_LOW = 0.03  # of the farthest input: a load that changes nothing by itself
 _ALIKE = 0.02  # of the larger: two lags that are no further apart are one
 _MOVES = 1e-9  # of the larger: of a stage that moves by less nothing is read off
 
@@ -62,6 +62,12 @@ def _to_go(bench: Any, y: Array, h: float, up: bool, effect: bool = True) -> Arr
     return made
 
 
+def _of_top(bench: Any, effect: bool = True, at: float | None = None) -> float:
+    """How far the input that is farthest from 0 moves the stage from where it rests at 0."""
+    y = bench.run(np.r_[0.0, np.full(_SETTLED * _COARSE, bench.top)], bench.response / _COARSE, effect, at)
+    return float(y[-1] - y[0]) or np.nan
+
+
 def _further_lag(bench: Any, up: bool = True) -> float:
     """The area between both responses is the mean time by which one is later."""
     with_it, without, h = _step(bench, up)
@@ -92,7 +98,7 @@ def _down_over_up(bench: Any) -> float:
 
 def _highest_rate(bench: Any) -> float:
     with_it, _, h = _step(bench, fine=_FINE * 5, long=_SETTLED)
-    return float(np.max(np.abs(np.diff(with_it)))) / h
+    return float(np.max(np.abs(np.diff(with_it)))) / h or np.nan
 
 
 def _staircase(bench: Any, levels: Array) -> tuple[Array, Array]:
@@ -121,8 +127,7 @@ def _bow(bench: Any) -> float:
 
 
 def _lost(bench: Any) -> float:
-    with_it, without = (y[-1] for y in _staircase(bench, np.array([bench.low, bench.high])))
-    return 100.0 * float(1.0 - with_it / without) if without else np.nan
+    return 100.0 * (1.0 - _of_top(bench) / _of_top(bench, False))
 
 
 def _lost_travel(bench: Any) -> float:
@@ -167,24 +172,20 @@ def _half_gone(bench: Any) -> float:
 
 
 def _gain_over_session(bench: Any) -> float:
-    x = np.r_[bench.low, np.full(_SETTLED * _COARSE, bench.high)]
-    h = bench.response / _COARSE
-    first, last = (bench.run(x, h, start=start) for start in (bench.begin, bench.end))
-    return 100.0 * float((last[-1] - last[0]) / (first[-1] - first[0]) - 1.0)
+    return 100.0 * (_of_top(bench, at=bench.end) / _of_top(bench, at=bench.begin) - 1.0)
 
 
 def _zero_over_session(bench: Any) -> float:
     x, h = np.full(3, bench.low), bench.response / _COARSE
-    first, last = (bench.run(x, h, start=start) for start in (bench.begin, bench.end))
+    first, last = (bench.run(x, h, at=at) for at in (bench.begin, bench.end))
     return float(last[-1] - first[-1])
 
 
 def _gain_after_session(bench: Any) -> float:
     """Of a small load, ahead of all that was done and behind it."""
     h, inputs = bench.step, bench.inputs
-    load = bench.low + _LOW * (bench.high - bench.low)
-    hold = np.full(min(int(_SETTLED * bench.response / h) + 2, len(inputs)), load)
-    x = np.r_[bench.low, hold, inputs, hold]
+    hold = np.full(min(int(_SETTLED * bench.response / h) + 2, len(inputs)), _LOW * bench.top)
+    x = np.r_[0.0, hold, inputs, hold]
     ratios = []
     for effect in (True, False):
         y = bench.run(x, h, effect)
@@ -197,13 +198,13 @@ LATER_DOWN = Size("further lag on the way back", "s", _further_lag_down)
 DOWN_OVER_UP = Size("time to unload over time to load", "", _down_over_up)
 HIGHEST_RATE = Size("highest rate", "out/s", _highest_rate)
 WIDEST_LOOP = Size("widest loop", "out", _widest_loop)
-BOW = Size("bow of the static curve", "out", _bow, signed=True)
-LOST = Size("lost at the highest input", "%", _lost)
-LOST_TRAVEL = Size("travel lost at a turn", "in", _lost_travel)
+BOW = Size("bend of the static curve", "out", _bow, signed=True)
+LOST = Size("share lost at the highest input", "%", _lost)
+LOST_TRAVEL = Size("command lost at each reversal", "in", _lost_travel)
 FREQUENCY = Size("frequency", "Hz", lambda bench: 1.0 / bench.number("period"))
 FURTHER_CREEP = Size("more from {early:g} s to {late:g} s of a hold", "%", _further_creep)
 OVERSHOOT = Size("overshoot of a step", "%", _largest_overshoot)
-HALF_GONE = Size("half of it gone after", "s", _half_gone)
+HALF_GONE = Size("overshoot half gone after", "s", _half_gone)
 GAIN_OVER_SESSION = Size("change of the gain over the session", "%", _gain_over_session)
 ZERO_OVER_SESSION = Size("change of the zero over the session", "out", _zero_over_session, signed=True)
-GAIN_AFTER_SESSION = Size("change of the gain at small loads by the session", "%", _gain_after_session)
+GAIN_AFTER_SESSION = Size("change over the session of the gain for small loads", "%", _gain_after_session)
