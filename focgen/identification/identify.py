@@ -105,11 +105,10 @@ def identify(
     if "actuator" in stages:
         ahead, rival = fed(experiments, new, found.get("regulator"))
         result = _actuator(experiments, others, ahead, rival, gain_degree, delay, integer)
-        result = replace(result, rig=_behind(result.rig, ahead, new))
+        result = _behind(result, ahead, new)
     else:
         result = Identification((), None, new, {}, {}, (), ())
-    result = replace(result, stages=found)
-    result = _sensor_again(result, experiments)
+    result = _sensor_again(replace(result, stages=found), experiments)
     warnings = effects_left_out(nominal) + doubts(nominal, experiments) + result.warnings
     notes = remarks_of(experiments, nominal, result) + told + result.notes
     result = replace(result, warnings=warnings, notes=notes)
@@ -125,14 +124,15 @@ def identify(
     return result
 
 
-def _behind(found: Rig, ahead: Rig, rig: Rig) -> Rig:
-    """The rig that was ``found`` behind what was ``ahead``, with the regulator of its file again."""
+def _behind(result: Identification, ahead: Rig, rig: Rig) -> Identification:
+    """What was found behind what was ``ahead``, with the regulator of the ``rig`` again."""
+    found = result.rig
     if ahead is rig:
-        return found
+        return result
     delays = replace(found.delays, regulator=rig.delays.regulator)
     known = replace(found.uncertainty, regulator=rig.uncertainty.regulator)
     own: dict[str, Any] = {"lead": rig.lead, "between": rig.between, "regulator": rig.regulator}
-    return replace(found, delays=delays, uncertainty=known, **own)
+    return replace(result, rig=replace(found, delays=delays, uncertainty=known, **own))
 
 
 def _sensor_again(result: Identification, experiments: Sequence[Experiment]) -> Identification:
