@@ -103,9 +103,8 @@ def identify(
     ranges, told = seen_ranges(nominal.ranges, experiments)
     new = _with_stages(replace(nominal, ranges=ranges, effects=()), found)
     if "actuator" in stages:
-        ahead, rival = fed(experiments, new, found.get("regulator"))
-        result = _actuator(experiments, others, ahead, rival, gain_degree, delay, integer)
-        result = _behind(result, ahead, new)
+        by, rival = fed(experiments, new, found.get("regulator"))
+        result = _behind(_actuator(experiments, others, by, rival, gain_degree, delay, integer), by, new)
     else:
         result = Identification((), None, new, {}, {}, (), ())
     result = _sensor_again(replace(result, stages=found), experiments)
