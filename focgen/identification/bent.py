@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from focgen.arrays import Array
+from focgen.identification.excitation import varying_reference
 from focgen.identification.smoothed import without_noise
 from focgen.logs.between import Between, jumps_of
 from focgen.logs.experiment import Experiment
@@ -32,6 +33,8 @@ def driving(experiment: Experiment, rig: Rig | None) -> Array:
     read = np.asarray(experiment["curvature"], float)
     plain = without_noise(read, jumps_of(read))
     if rig is None or "command" not in experiment or not turns_within(rig, experiment.sample_time):
+        return plain
+    if varying_reference(experiment) is not None:  # noise that a loop passes on moves the rig
         return plain
     command, step = np.asarray(experiment["command"], float), experiment.sample_time
     run = Run.of([len(command)], [0.0], step)

@@ -185,7 +185,7 @@ def prepare(experiment: Experiment, rig: Rig, powers: int = 1, before: float | N
     first sample (None: as at the first sample). Raises LogError where a signal is constant or too short.
     """
     _check(experiment)
-    reference = _varying_reference(experiment)
+    reference = varying_reference(experiment)
     pressure, level_before, jumps, between, role = _input(experiment, rig, before, reference is not None)
     within = _within(experiment, rig, role, pressure, level_before)
     fitted = "curvature" if "curvature" in experiment else "output"
@@ -237,7 +237,7 @@ def possible_rests(experiment: Experiment) -> tuple[float | None, ...]:
     return (None,) if abs(values[0]) <= _AT_REST * np.abs(values).max() else (None, 0.0)
 
 
-def _varying_reference(experiment: Experiment) -> Array | None:
+def varying_reference(experiment: Experiment) -> Array | None:
     """What a closed loop was asked for, whether it was logged or shows in the command alone."""
     if "reference" in experiment and np.ptp(experiment["reference"]) > 0.0:
         return experiment["reference"]

@@ -24,7 +24,9 @@ from focgen.rig.rig import Rig
 from focgen.rig.within import as_sent, scaled_to
 
 _AS_WELL = 1.1  # times the strays: a file's regulator that leaves no more is taken
-_TIED = 10.0  # of Schwarz's criterion: shapes that are no further behind are rivals
+# of Schwarz's criterion: shapes that are no further behind are rivals, if they are lags and dead times: what
+# rings or leads within a sample is anything
+_TIED, _ANYTHING = 10.0, {"wn", "zero"}
 _APART = 0.02  # samples: rivals that are no later or sooner are none
 
 
@@ -42,8 +44,9 @@ def fed(experiments: Sequence[Experiment], rig: Rig, found: StageFit | None) -> 
     except FitError:
         return replace(rig, between=Between.STRAIGHT), None  # between two readings nothing is known
     here = _running(rig, fit)
-    likely = [shape for shape in fit.fits if shape.bic <= min(s.bic for s in fit.fits) + _TIED]
-    others = [here, *(_with(here, shape) for shape in likely)]
+    least = min(shape.bic for shape in fit.fits) + _TIED
+    plain = [shape for shape in fit.fits if not _ANYTHING & set(shape.parameters)]
+    others = [here, *(_with(here, shape) for shape in plain if shape.bic <= least)]
     of_file = rig if found else _suiting(rig, here, experiments)
     told = of_file or here
     if told.between not in (None, Between.HELD):

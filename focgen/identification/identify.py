@@ -48,6 +48,10 @@ from focgen.rig.rig import Actuator, Rig
 from focgen.rig.stages import STAGES
 
 Quality = dict[str, dict[str, float]]
+_NOT_THIS = (
+    "the regulator of the rig's file is not the one that these logs show, which the actuator is fitted "
+    "behind: give --stages regulator,actuator to have it written"
+)
 _COMPROMISE = (
     "what the model cannot follow outweighs the noise: T, alpha and K(p) are a compromise, and known "
     "no better than [uncertainty] says, whatever their intervals"
@@ -131,7 +135,9 @@ def _behind(result: Identification, ahead: Rig, rig: Rig) -> Identification:
     delays = replace(found.delays, regulator=rig.delays.regulator)
     known = replace(found.uncertainty, regulator=rig.uncertainty.regulator)
     own: dict[str, Any] = {"lead": rig.lead, "between": rig.between, "regulator": rig.regulator}
-    return replace(result, rig=replace(found, delays=delays, uncertainty=known, **own))
+    told = (_NOT_THIS,) if ahead.regulator != rig.regulator else ()
+    found = replace(found, delays=delays, uncertainty=known, **own)
+    return replace(result, rig=found, notes=result.notes + told)
 
 
 def _sensor_again(result: Identification, experiments: Sequence[Experiment]) -> Identification:
@@ -140,8 +146,11 @@ def _sensor_again(result: Identification, experiments: Sequence[Experiment]) -> 
     rig = result.rig
     if "sensor" not in result.stages or not turns_within(rig, experiments[0].sample_time):
         return result
-    again = {"sensor": identify_stage(experiments, "sensor", rig.between, rig)}
-    return replace(result, rig=_with_stages(rig, again), stages=result.stages | again)
+    again = identify_stage(experiments, "sensor", rig.between, rig)
+    if not again.leaves_less_than(result.stages["sensor"]):  # else the actuator is not what drives it
+        return result
+    found = {"sensor": again}
+    return replace(result, rig=_with_stages(rig, found), stages=result.stages | found)
 
 
 def _read(logs: Logs, rig: Rig, first: float | None, last: float | None) -> tuple[Experiment, ...]:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +19,8 @@ from focgen.logs.experiment import Experiment
 from focgen.rig.rig import Rig
 
 Befores = list[float | None]
+
+_TOLD = 20.0  # nats, of residuals that are not white: then the output tells one from the other
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +48,12 @@ def joint_fit(
     befores = befores_of(used, rig, degree + 1)
     try:
         made = _fit(used, befores, rig, degree, delay)
-        made = made if rival is None else _as_unsure(made, used, befores, rival, degree, delay)
     except FitError:
         if (looped := _looped_otherwise(used, befores, rig, degree, delay)) is None:
             raise
         return looped
+    if rival is not None and not made.found.width:
+        made = _beside(made, _or_none(used, befores, rival, degree, delay))
     if not (made.found.width or misfit_of(made.plain, made.found.fit)):
         return made
     looped = _looped_otherwise(used, befores, rig, degree, delay)
@@ -58,14 +62,33 @@ def joint_fit(
     return looped
 
 
-def _as_unsure(
-    made: JointFit, used: Sequence[Experiment], befores: Befores, rival: Rig, degree: int, delay: bool
-) -> JointFit:
-    """A fit whose intervals reach to what it would be, were the ``rival`` what drove the experiments."""
-    fit, other = made.found.fit, _fit(used, befores, rival, degree, delay).found.fit
+def _or_none(
+    used: Sequence[Experiment], befores: Befores, rig: Rig, degree: int, delay: bool
+) -> JointFit | None:
+    try:
+        return _fit(used, befores, rig, degree, delay)
+    except FitError:
+        return None
+
+
+def _beside(made: JointFit, rival: JointFit | None) -> JointFit:
+    """A fit beside that of a ``rival`` that may have driven the experiments: the likelier of the two where
+    the output tells, else the first, with intervals that reach to the other. Raises FitError where that
+    leaves nothing of T."""
+    if rival is None or rival.found.width:
+        return made
+    fit, other = made.found.fit, rival.found.fit
+    count = sum(map(len, made.plain))
+    nats = 0.5 * count * np.log(max(rival.found.left, 1e-300) / max(made.found.left, 1e-300))
+    if abs(nats) > _TOLD:
+        return made if nats > 0.0 else replace(rival, rig=made.rig)
     names = ("T", "alpha", "delay", "gain")[: 4 if len(fit.gain) == len(other.gain) else 3]
-    apart = {n: fit.half[n] + np.abs(getattr(fit, n) - getattr(other, n)) for n in names}
-    return replace(made, found=replace(made.found, fit=replace(fit, half=fit.half | apart)))
+    half: dict[str, Any] = dict(fit.half)
+    apart = {n: half[n] + np.abs(getattr(fit, n) - getattr(other, n)) for n in names}
+    if apart["T"] >= fit.T:
+        what = "is not told from what a quick regulator does within a sample"
+        raise FitError("T", what, "log more samples a second, or leave out the pressure")
+    return replace(made, found=replace(made.found, fit=replace(fit, half=half | apart)))
 
 
 def _looped_otherwise(

@@ -38,6 +38,7 @@ from focgen.rig.rig import Rig
 
 _SIGNALS = {"regulator": ("command", "pressure"), "sensor": ("curvature", "output")}
 _FEWEST = 30  # samples
+_FAR = 10.0  # of Schwarz's criterion: a fit that is so far ahead is the likelier one
 _MOST = 50_000  # samples that the shapes are compared on
 _SHOWS = 8  # samples that show whether a log begins at rest
 _EARLY = 2.0  # samples that a command which rests between jumps may be ahead of its row: a row may have what
@@ -75,6 +76,11 @@ class StageFit:
     simulated: tuple[Array, ...]
     step: float
     notes: tuple[str, ...]
+
+    def leaves_less_than(self, other: StageFit) -> bool:
+        """Whether it is far likelier than an ``other`` fit to the same readings."""
+        mine, theirs = (min(shape.bic for shape in fit.fits) for fit in (self, other))
+        return mine < theirs - _FAR
 
     @property
     def traces(self) -> list[tuple[Array, Array, Array]]:

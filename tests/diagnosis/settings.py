@@ -62,7 +62,7 @@ CONSTANTS = {
     "verdict/compose.py": ["_SHOWN"],
     "verdict/evidence.py": ["_STILL"],
     "verdict/moves.py": ["_SLACK"],
-    "verdict/on_the_bench.py": ["_FORMS", "_NUDGE", "_PLAIN"],
+    "verdict/on_the_bench.py": ["_FORMS", "_NUDGE", "_PLAIN", "_SAMPLE"],
     "verdict/moving.py": ["_MOST", "_SEEN", "_SURE"],
     "verdict/sizes.py": ["_SLACK"],
     "verdict/outside.py": ["_ASKED", "_BAND"],

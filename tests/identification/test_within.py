@@ -27,7 +27,7 @@ def sines(rng):
     return 1.5 + 0.4 * np.sin(phases + rng.uniform(0.0, 6.0, 4)).sum(1)
 
 
-def logs_of(command_of, tau, alpha, pressure):
+def logs_of(command_of, tau, alpha, pressure, noise=0.006):
     """Two logs of a held command: the pressure is the exact one of a lag, and what is behind both is exact,
     too, as one transfer function."""
     rng, logs = np.random.default_rng(5), []
@@ -40,9 +40,9 @@ def logs_of(command_of, tau, alpha, pressure):
         command = command_of(rng)
         moved = command - command[0]
         signals = {"command": command}
-        for role, stage, noise in (("output", both, 0.006), ("pressure", lag, 0.009)):
+        for role, stage, off in (("output", both, noise), ("pressure", lag, 0.009)):
             made = stage.dc_gain * command[0] + Convolution(stage, H).run(moved)
-            signals[role] = made + rng.normal(0.0, noise, COUNT)
+            signals[role] = made + rng.normal(0.0, off, COUNT)
         kept = {role: values for role, values in signals.items() if pressure or role != "pressure"}
         logs.append(Experiment(f"e{number}", H, kept, start=900.0 * number))
     return logs
@@ -121,11 +121,21 @@ def test_a_regulator_of_the_file_that_the_pressure_contradicts_tells_nothing(wro
     assert found.rig.regulator == said and found.rig.lead == 0.0  # --stages does not name it
 
 
-def test_where_a_lag_and_a_dead_time_look_alike_T_is_known_no_better_than_they_are_apart():
-    """The pressure is there at the next reading either way: it came at once, or within the sample."""
+def behind_what_was_at_once(noise):
+    """The pressure is there at the next reading: it came at once, or within the sample, or at its end."""
     at_once = TransferFunction([(1.1, 0.0)], [(0.002, 1.0), (1.0, 0.0)])
     rough = Rig("finger", H, SIGNALS[True], Actuator(T, 1.0, (GAIN,)), regulator=at_once)
-    found = identify(rough, logs_of(staircase, 0.002, 1.0, True), integer=False)
+    return identify(rough, logs_of(staircase, 0.002, 1.0, True, noise), integer=False)
+
+
+def test_the_output_tells_a_lag_within_a_sample_from_a_dead_time():
+    found = behind_what_was_at_once(0.006)
     low, high = found.joint.ci95["T"]
-    assert found.rig.actuator.T == pytest.approx(T, rel=0.02) and high - low > 0.2
-    assert found.rig.uncertainty.actuator.time > 0.05
+    assert found.rig.actuator.T == pytest.approx(T, rel=0.01) and low < T < high
+
+
+def test_where_it_does_not_T_is_known_no_better_than_they_are_apart():
+    found = behind_what_was_at_once(0.3)
+    low, high = found.joint.ci95["T"]
+    assert low < T < high and high - low > 0.25
+    assert found.rig.uncertainty.actuator.time > 0.1

@@ -20,6 +20,7 @@ from focgen.rig.stages import ENTERS, LEAVES, STAGES
 # of a size: of those that the writer of blind rigs measured, whose forms are none of the library's, four in
 # five are as near; the second of a parameter, as a ceiling, that is none of a form's shape
 _FORMS, _PLAIN = 0.05, 0.02
+_SAMPLE = 0.3  # of a sample: a fit on the log's grid is as far off in time
 _NUDGE = 0.3  # of a standard deviation: by so much a parameter is moved to see what a size makes of it
 
 
@@ -64,7 +65,7 @@ def measured(of: Fit, effect: str, parameters: Mapping[str, Estimate], rig: Rig)
     for size in library()[effect].sizes:
         own = next((parameters[name] for name in size.own if name in parameters), None)
         if own is not None:
-            estimate: Estimate | None = _no_nearer(own, _PLAIN)
+            estimate: Estimate | None = _no_nearer(own, _PLAIN, _timing(own.unit, found))
         else:
             estimate = _read(found, size, rig) if _at_rest_anywhere(found) else None
         if estimate is not None:
@@ -81,12 +82,19 @@ def _read(found: _Found, size: Size, rig: Rig) -> Estimate | None:
     scale, unit = _seen_in(size.unit, found.bench.stage, rig)
     value, half = value * scale, half * abs(scale)
     made = Estimate(value, (value - half, value + half), unit)
-    return _no_nearer(made, _FORMS) if np.isfinite(half) else None
+    return _no_nearer(made, _FORMS, _timing(unit, found)) if half < abs(value) else None
 
 
-def _no_nearer(known: Estimate, share: float) -> Estimate:
-    """An estimate that is known to no less than a ``share`` of itself: no form is quite the rig's."""
-    low, high = (float(np.hypot(end - known.value, share * known.value)) for end in known.ci95)
+def _timing(unit: str, found: _Found) -> float:
+    """What samples leave open of a size in s."""
+    return _SAMPLE * found.of.problem.segment.fed.run.h if unit == "s" else 0.0
+
+
+def _no_nearer(known: Estimate, share: float, least: float) -> Estimate:
+    """An estimate that is known to no less than a ``share`` of itself, for no form is quite the rig's, and
+    to no less than the ``least``."""
+    off = float(np.hypot(share * known.value, least))
+    low, high = (float(np.hypot(end - known.value, off)) for end in known.ci95)
     return Estimate(known.value, (known.value - low, known.value + high), known.unit)
 
 
