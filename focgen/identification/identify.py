@@ -146,8 +146,11 @@ def _sensor_again(result: Identification, experiments: Sequence[Experiment]) -> 
     rig = result.rig
     if "sensor" not in result.stages or not turns_within(rig, experiments[0].sample_time):
         return result
-    again = identify_stage(experiments, "sensor", rig.between, rig)
-    if not again.leaves_less_than(result.stages["sensor"]):  # else the actuator is not what drives it
+    try:
+        again = identify_stage(experiments, "sensor", rig.between, rig)
+    except FitError:
+        return result
+    if not again.leaves_less_than(result.stages["sensor"]):  # the actuator is then not what drives it
         return result
     found = {"sensor": again}
     return replace(result, rig=_with_stages(rig, found), stages=result.stages | found)
