@@ -14,10 +14,11 @@ import pytest
 from focgen.diagnosis.diagnose import diagnose
 from focgen.diagnosis.model import Candidate, Estimate, Found
 from focgen.diagnosis.turned import _signed
-from focgen.diagnosis.verdict.on_the_bench import seen_as
+from focgen.diagnosis.verdict.on_the_bench import _read, _seen_in, seen_as
 from focgen.diagnosis.verdict.sizes import _counted, spread
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.experiment import Experiment
+from focgen.rig.effects import Size
 from focgen.rig.rig import Actuator, Rig, Signals
 from focgen.rig.turned import Turn
 
@@ -144,3 +145,27 @@ def test_a_nuisance_is_no_further_off_than_it_may_be():
 def test_a_step_is_known_to_half_a_level_over_the_span():
     assert _counted([0.4, 0.5, 0.6], 10.0) == [0.4875, 0.5, 0.5125]
     assert _counted([0.499, 0.5, 0.501], 10.0) == [0.499, 0.5, 0.501]
+
+
+def of_rows(step):
+    return SimpleNamespace(problem=SimpleNamespace(segment=SimpleNamespace(fed=SimpleNamespace(run=step))))
+
+
+def test_what_leaves_the_actuator_is_told_in_what_the_sensor_makes_of_it():
+    assert _seen_in("out", "actuator", rig(0.2)) == (pytest.approx(0.2), "deg")
+    assert _seen_in("out/s", "regulator", rig()) == (1.0, "bar/s")
+    assert _seen_in("in", "actuator", rig()) == (1.0, "bar") and _seen_in("%", "sensor", rig()) == (1.0, "%")
+
+
+@pytest.mark.parametrize("half, told", [(0.5, True), (2.5, False)])
+def test_a_size_that_may_be_nothing_at_all_is_none(half, told):
+    found = SimpleNamespace(
+        read=lambda size: 2.0,
+        half=lambda size, value: half,
+        bench=SimpleNamespace(stage="regulator"),
+        of=of_rows(SimpleNamespace(h=1.0)),
+    )
+    lag = _read(found, Size("further lag", "s"), rig())
+    assert (lag is not None) == told
+    if told:  # as noise leaves it, a twentieth of itself, and three tenths of a sample
+        assert lag.ci95[1] - lag.value == pytest.approx(np.sqrt(0.5**2 + 0.1**2 + 0.3**2))

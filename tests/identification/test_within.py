@@ -5,12 +5,17 @@ Red when T, alpha, K or a sensor's lag take up what a signal does between its re
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from focgen.errors import FitError
 from focgen.fractional.simulation import Convolution
 from focgen.fractional.transfer import TransferFunction
+from focgen.identification.bent import driving
 from focgen.identification.identify import identify
+from focgen.identification.stages import identify_stage
 from focgen.logs.experiment import Experiment
 from focgen.rig.rig import Actuator, Rig, Signals
 
@@ -139,3 +144,52 @@ def test_where_it_does_not_T_is_known_no_better_than_they_are_apart():
     low, high = found.joint.ci95["T"]
     assert low < T < high and high - low > 0.25
     assert found.rig.uncertainty.actuator.time > 0.1
+
+
+def test_the_output_corrects_a_regulator_that_the_readings_leave_open():
+    """Nothing of a lag of a hundredth of a sample is in them: it may be a dead time of a whole one."""
+    rough = Rig("finger", H, SIGNALS[True], Actuator(T, 1.0, (GAIN,)))
+    lag = TransferFunction([(1.1, 0.0)], [(0.2, 1.0), (1.0, 0.0)])
+    logs = logs_of(staircase, 0.002, 1.0, True)
+    found = identify(replace(rough, regulator=lag), logs, stages=("regulator", "actuator"), integer=False)
+    low, high = found.joint.ci95["T"]
+    assert found.rig.actuator.T == pytest.approx(T, rel=0.05), (low, high)
+
+
+def test_a_second_fit_of_a_sensor_has_to_leave_less(monkeypatch):
+    logs = seen_by_a_sensor(0.7, 1.0, 0.3)
+    slow = TransferFunction([(1.0, 0.0)], [(0.3, 1.0), (1.0, 0.0)])
+    rough = Rig("finger", H, Signals("t", "y", "u", None, "k"), Actuator(T, 0.7, (2.0,)), sensor=slow)
+    first, second = (identify_stage(logs, "sensor", None, rig) for rig in (None, rough))
+    assert second.leaves_less_than(first) and not first.leaves_less_than(second)
+
+    def the_other_way_round(experiments, stage, between=None, ahead=None):
+        return second if ahead is None else first
+
+    monkeypatch.setattr("focgen.identification.identify.identify_stage", the_other_way_round)
+    assert identify(rough, logs, stages=("sensor",)).stages["sensor"] is second
+
+    def undetermined(experiments, stage, between=None, ahead=None):
+        if ahead is not None:
+            raise FitError("sensor", "has an unknown gain", "log more")
+        return first
+
+    monkeypatch.setattr("focgen.identification.identify.identify_stage", undetermined)
+    assert identify(rough, logs, stages=("sensor",)).stages["sensor"] is first
+
+
+@pytest.mark.parametrize("reference", [None, "varying"])
+def test_a_sensor_is_driven_as_it_was_read_in_a_loop_or_by_a_command_that_is_not_held(reference):
+    (log, _), fine = seen_by_a_sensor(0.7, 1.0, 0.3), 20
+    rig = Rig("finger", H, Signals("t", "y", "u", None, "k"), Actuator(T, 0.7, (2.0,)))
+    assert not np.array_equal(driving(log, rig), driving(log, None))
+    if reference:
+        log = replace(log, signals=dict(log.signals) | {"reference": staircase(np.random.default_rng(1))})
+    else:
+        at = np.arange(COUNT * fine) * H / fine
+        command = 1.5 - 1.5 * np.cos(0.9 * at)
+        plant = TransferFunction([(2.0, 0.0)], [(1.0, 0.7), (1.0, 0.0)])
+        curvature = Convolution(plant, H / fine, "linear").run(command)
+        kept = {"command": command[::fine], "curvature": curvature[::fine], "output": log["output"]}
+        log = replace(log, signals=kept)
+    np.testing.assert_array_equal(driving(log, rig), driving(log, None))

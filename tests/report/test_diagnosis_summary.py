@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from focgen.diagnosis.model import Candidate, Diagnosis, Estimate, Found, Gap, NextExperiment, PlainFit, Where
 from focgen.report.diagnosis_summary import diagnosis_text
+from focgen.report.results.findings import _candidates
 
 UNITS = {"command": "V", "pressure": "bar", "curvature": "1/mm", "output": "1/mm"}
 CEILING = Candidate(
@@ -100,3 +101,21 @@ def test_a_cause_that_is_not_likely_is_said_not_to_be():
     faint = replace(FOUND.causes[0], candidates=(replace(CEILING, confidence=0.4),))
     texts = [diagnosis_text(replace(FOUND, causes=c), UNITS, "gap") for c in ((faint,), FOUND.causes)]
     assert ["likelier it is something else, as the notes say" in text for text in texts] == [True, False]
+
+
+def test_an_effect_is_told_by_its_sizes_where_it_has_any():
+    sized = replace(CEILING, sizes={"share lost at the highest input": Estimate(12.0, (11.0, 13.0), "%")})
+    text = diagnosis_text(
+        replace(FOUND, causes=(replace(FOUND.causes[0], candidates=(sized,)),)), UNITS, "gap"
+    )
+    assert "in the regulator (share lost at the highest input 12 ± 1 %), 90% confident" in text
+    assert "ceiling" not in text
+
+
+def test_the_table_has_each_number_once():
+    known = Estimate(0.152, (0.14, 0.16), "bar")
+    both = replace(CEILING, sizes={"ceiling": known, "further lag": Estimate(1.0, (0.9, 1.1), "s")})
+    cause = replace(FOUND.causes[0], candidates=(both, replace(CEILING, parameters={})))
+    rows = _candidates(replace(FOUND, causes=(cause,)))
+    assert [row["parameter"] for row in rows] == ["ceiling", "further lag", "width", None]
+    assert rows[0]["low"] == 0.14  # the size's, which allows for the form

@@ -94,12 +94,26 @@ def test_straight_lines_hold_the_area_of_the_response_once_it_is_laid_on_the_sam
     assert abs(H * times @ made[-1] / first - 1.0) > 3e-3  # lines through the readings do not
 
 
+@pytest.mark.parametrize("tau", [0.1, 0.3])
+def test_what_lines_miss_goes_to_the_end_of_the_sample_that_it_is_nearer_to(tau):
+    command = (np.arange(COUNT) >= 10).astype(float)
+    made = by_regulator(lag(tau), H, command, 0.0)
+    nodes, fine = np.arange(COUNT) * H, np.arange(COUNT * 500 - 499) * H / 500
+    wanted = exact(command, tau, fine)
+    lines = [np.interp(fine, nodes, y) for y in (made[-1] + laid_on_samples(made, nodes == 0.0), made[-1])]
+    for power in (0, 1):
+        off, plain = (float(fine**power @ (line - wanted)) * H / 500 for line in lines)
+        assert abs(off) < 0.02 * abs(plain)
+
+
 def test_experiments_stay_apart():
     command = np.r_[np.ones(COUNT), np.zeros(COUNT)]
     made = np.concatenate([by_regulator(lag(0.1), H, part, 0.0) for part in np.split(command, 2)], axis=1)
     first = np.arange(2 * COUNT) % COUNT == 0
     assert not np.any(laid_on_samples(made, first)[COUNT:])
     assert np.any(laid_on_samples(made, np.arange(2 * COUNT) == 0)[COUNT - 1 : COUNT + 1])
+    begun = made + (PLACES[:, None] - 1.0) * first  # what was before a log begins is no part of it
+    np.testing.assert_array_equal(laid_on_samples(begun, first), laid_on_samples(made, first))
 
 
 @pytest.mark.parametrize("off", [1.0, 1.03])
