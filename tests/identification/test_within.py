@@ -187,7 +187,7 @@ def test_a_sensor_is_driven_as_it_was_read_in_a_loop_or_by_a_command_that_is_not
         log = replace(log, signals=dict(log.signals) | {"reference": staircase(np.random.default_rng(1))})
     else:
         at = np.arange(COUNT * fine) * H / fine
-        command = 1.5 - 1.5 * np.cos(0.9 * at)
+        command = 1.5 - 1.5 * np.cos(0.15 * at)
         plant = TransferFunction([(2.0, 0.0)], [(1.0, 0.7), (1.0, 0.0)])
         curvature = Convolution(plant, H / fine, "linear").run(command)
         kept = {"command": command[::fine], "curvature": curvature[::fine], "output": log["output"]}
