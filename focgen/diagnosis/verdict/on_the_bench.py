@@ -42,8 +42,8 @@ class _Found:
             return float(size.read(bench)) if size.read else np.nan
 
     def half(self, size: Size, value: float) -> float:
-        """Half of a size's 95 % interval, from the covariance of its parameters and the rig's own: what a
-        curve has more of than the gain has less is no doubt of its bow."""
+        """Half of a size's 95 % interval, from the covariance of its parameters with the rig's own: a curve
+        that is steeper behind a smaller gain bends as far."""
         places, covariance = spread(self.of, self.which, own=True)
         low, high = self.of.problem.bounds()
         slopes = np.zeros(len(places))
