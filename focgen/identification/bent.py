@@ -7,23 +7,22 @@ from dataclasses import replace
 import numpy as np
 
 from focgen.arrays import Array
-from focgen.identification.excitation import varying_reference
+from focgen.identification.excitation import is_held, varying_reference
 from focgen.identification.smoothed import without_noise
 from focgen.logs.between import Between, jumps_of
 from focgen.logs.experiment import Experiment
-from focgen.rig.corners import kinks
 from focgen.rig.effects import Run
 from focgen.rig.engine import Chain
 from focgen.rig.kernels import BALANCED
 from focgen.rig.rig import Rig
-from focgen.rig.within import laid_on_samples, made_within, read_within, scaled_to
+from focgen.rig.within import kinks, laid_on_samples, made_within, read_within, scaled_to
 
 _AHEAD = ("regulator", "actuator")  # of the sensor
 
 
 def turns_within(rig: Rig, step: float) -> bool:
     """Whether a held command makes a rig's curvature turn within samples of ``step`` s."""
-    return rig.actuator is not None and rig.between in (None, Between.HELD) and kinks(rig, _AHEAD, step)
+    return rig.actuator is not None and is_held(rig) and kinks(rig, _AHEAD, step)
 
 
 def driving(experiment: Experiment, rig: Rig | None) -> Array:

@@ -22,7 +22,7 @@ from focgen.logs.experiment import Experiment, check_output
 from focgen.logs.feedback import unlogged_reference
 from focgen.rig import kernels
 from focgen.rig.rig import UNITY, Rig
-from focgen.rig.within import by_regulator, course_within, is_quick, read_within, scaled_to
+from focgen.rig.within import by_regulator, course_within, kinks, read_within, scaled_to
 
 _AT_REST = 0.02  # of the input's largest value: closer to 0 than this it starts at rest at 0
 _AWAY = 0.1  # of a step: nearer to one of its ends the input is at it
@@ -295,7 +295,7 @@ def _input(
     gain = rig.regulator.dc_gain
     if not np.isfinite(gain):
         raise FitError("regulator", "integrates, so it has no rest to start from", "log the pressure")
-    moved = run_stage("regulator", rig.regulator, experiment.sample_time, _hold(rig), command - rest)
+    moved = run_stage("regulator", rig.regulator, experiment.sample_time, hold_of(rig), command - rest)
     return gain * rest + moved, gain * rest, none, Between.SMOOTH, "command"
 
 
@@ -303,9 +303,7 @@ def _within(experiment: Experiment, rig: Rig, role: str, pressure: Array, before
     """The pressure (n,) within each sample (7, n), as a quick regulator makes it of a held command, from rest
     at ``before``; None where that is not known."""
     step, regulator = experiment.sample_time, rig.regulator
-    if "command" not in experiment or regulator == UNITY or _hold(rig) != "zero":
-        return None
-    if not is_quick(regulator, step):
+    if "command" not in experiment or not is_held(rig) or not kinks(rig, ("regulator",), step):
         return None
     command = experiment["command"]
     if role == "command":
@@ -332,14 +330,19 @@ def _by_regulator(experiment: Experiment, rig: Rig) -> Array | None:
     if "command" not in experiment or rig.regulator == UNITY or not np.isfinite(rig.regulator.dc_gain):
         return None
     command, places = experiment["command"], np.arange(len(experiment["command"]))
-    moved = run_stage("regulator", rig.regulator, experiment.sample_time, _hold(rig), command - command[0])
+    moved = run_stage("regulator", rig.regulator, experiment.sample_time, hold_of(rig), command - command[0])
     made: Array = np.interp(places - rig.delays.regulator / experiment.sample_time, places, moved)
     return made
 
 
-def _hold(rig: Rig) -> Literal["zero", "linear"]:
+def is_held(rig: Rig) -> bool:
+    """Whether a command is held between its samples: so it is taken where the rig does not say."""
+    return rig.between in (None, Between.HELD)
+
+
+def hold_of(rig: Rig) -> Literal["zero", "linear"]:
     """What a command does between its samples, in front of a regulator."""
-    return "zero" if rig.between in (None, Between.HELD) else "linear"
+    return "zero" if is_held(rig) else "linear"
 
 
 def _check_rest(sensor: TransferFunction) -> None:

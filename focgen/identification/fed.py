@@ -15,13 +15,14 @@ import numpy as np
 from focgen.arrays import Array
 from focgen.errors import FitError
 from focgen.fractional.simulation import Convolution
+from focgen.identification.excitation import hold_of, is_held
+from focgen.identification.ready import running
 from focgen.identification.shapes import ShapeFit
 from focgen.identification.stages import StageFit, identify_stage, transfer_of
 from focgen.logs.between import Between
 from focgen.logs.experiment import Experiment
-from focgen.rig.corners import kinks
 from focgen.rig.rig import Rig
-from focgen.rig.within import as_sent, scaled_to
+from focgen.rig.within import as_sent, kinks, scaled_to
 
 _AS_WELL = 1.1  # times the strays: a file's regulator that leaves no more is taken
 # of Schwarz's criterion: shapes that are no further behind are rivals, if they are lags and dead times: what
@@ -43,13 +44,13 @@ def fed(experiments: Sequence[Experiment], rig: Rig, found: StageFit | None) -> 
         fit = found or identify_stage(experiments, "regulator", rig.between)
     except FitError:
         return replace(rig, between=Between.STRAIGHT), None  # between two readings nothing is known
-    here = _running(rig, fit)
+    here = _with(running(rig, fit.between), fit)
     least = min(shape.bic for shape in fit.fits) + _TIED
     plain = [shape for shape in fit.fits if not _ANYTHING & set(shape.parameters)]
     others = [here, *(_with(here, shape) for shape in plain if shape.bic <= least)]
     of_file = rig if found else _suiting(rig, here, experiments)
     told = of_file or here
-    if told.between not in (None, Between.HELD):
+    if not is_held(told):
         return told, None
     rival = max(others, key=lambda other: abs(_late(other, step) - _late(told, step)), default=told)
     return told, rival if abs(_late(rival, step) - _late(told, step)) > _APART * step else None
@@ -67,26 +68,17 @@ def _strays(experiment: Experiment, rig: Rig) -> Array:
     from sample to sample."""
     step, late = experiment.sample_time, rig.delays.regulator - rig.lead
     command, late = as_sent(np.asarray(experiment["command"], float), step, late)
-    held = rig.between in (None, Between.HELD)
-    made = Convolution(rig.regulator, step, "zero" if held else "linear", late).run(command - command[0])
+    made = Convolution(rig.regulator, step, hold_of(rig), late).run(command - command[0])
     read = np.asarray(experiment["pressure"], float)
     off = read - scaled_to(read, made[None])[0]
     return np.array([np.mean(off**2), np.mean(np.diff(off) ** 2)])
 
 
-def _running(rig: Rig, fit: StageFit) -> Rig:
-    """The rig with a regulator as fitted, and what its command does as that shows."""
-    between = fit.between if rig.between is None else rig.between
-    made = {name: value for name, (value, _) in fit.parameters.items()}
-    delays = replace(rig.delays, regulator=fit.delay)
-    return replace(rig, regulator=fit.transfer, delays=delays, lead=made.get("lead", 0.0), between=between)
-
-
-def _with(rig: Rig, shape: ShapeFit) -> Rig:
-    """The rig with a regulator of that shape."""
-    made = {name: value for name, (value, _) in shape.parameters.items()}
+def _with(rig: Rig, of: StageFit | ShapeFit) -> Rig:
+    """The rig with a regulator as fitted."""
+    made = {name: value for name, (value, _) in of.parameters.items()}
     delays = replace(rig.delays, regulator=made.get("delay", 0.0))
-    return replace(rig, regulator=transfer_of(shape.parameters), delays=delays, lead=made.get("lead", 0.0))
+    return replace(rig, regulator=transfer_of(of.parameters), delays=delays, lead=made.get("lead", 0.0))
 
 
 def _late(rig: Rig, step: float) -> float:
@@ -98,5 +90,5 @@ def _late(rig: Rig, step: float) -> float:
         return by_order.get(1.0, 0.0) / by_order.get(0.0, np.inf)
 
     num, den = ([(t.coefficient, t.order) for t in part] for part in (rig.regulator.num, rig.regulator.den))
-    held = 0.5 * step * (rig.between in (None, Between.HELD))
+    held = 0.5 * step * is_held(rig)
     return moment(den) - moment(num) + rig.delays.regulator - rig.lead + held

@@ -13,7 +13,7 @@ import numpy as np
 from focgen.errors import FitError
 from focgen.identification.excitation import Excitation, possible_rests
 from focgen.identification.looped import Fitted, again, fitted
-from focgen.identification.ready import as_it_runs, befores_of, ready_for
+from focgen.identification.ready import apart, as_it_runs, befores_of, ready_for
 from focgen.identification.sure import misfit_of
 from focgen.logs.experiment import Experiment
 from focgen.rig.rig import Rig
@@ -82,13 +82,12 @@ def _beside(made: JointFit, rival: JointFit | None) -> JointFit:
     nats = 0.5 * count * np.log(max(rival.found.left, 1e-300) / max(made.found.left, 1e-300))
     if abs(nats) > _TOLD:
         return made if nats > 0.0 else replace(rival, rig=made.rig)
-    names = ("T", "alpha", "delay", "gain")[: 4 if len(fit.gain) == len(other.gain) else 3]
     half: dict[str, Any] = dict(fit.half)
-    apart = {n: half[n] + np.abs(getattr(fit, n) - getattr(other, n)) for n in names}
-    if apart["T"] >= fit.T:
+    half |= {name: half[name] + by for name, by in apart(fit, other).items()}
+    if half["T"] >= fit.T:
         what = "is not told from what a quick regulator does within a sample"
         raise FitError("T", what, "log more samples a second, or leave out the pressure")
-    return replace(made, found=replace(made.found, fit=replace(fit, half=half | apart)))
+    return replace(made, found=replace(made.found, fit=replace(fit, half=half)))
 
 
 def _looped_otherwise(

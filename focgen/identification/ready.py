@@ -164,8 +164,13 @@ def as_it_runs(
         return Runs(running(rig, way.known), way.lead, least=way.fit.half)
     if way.rival is None or not has_numbers(way.rival):
         return Runs(running(rig, way.known))
-    names = ("T", "alpha", "delay", "gain")[: 4 if len(way.fit.gain) == len(way.rival.gain) else 3]
-    return Runs(rig, apart={n: np.abs(getattr(way.fit, n) - getattr(way.rival, n)) for n in names})
+    return Runs(rig, apart=apart(way.fit, way.rival))
+
+
+def apart(fit: FractionalFit, other: FractionalFit) -> dict[str, Array | float]:
+    """By how much each of the numbers of a fit is another in an ``other`` one; K(p) if it has as many."""
+    names = ("T", "alpha", "delay", "gain")[: 4 if len(fit.gain) == len(other.gain) else 3]
+    return {n: np.abs(getattr(fit, n) - getattr(other, n)) for n in names}
 
 
 def running(rig: Rig, between: Between | None) -> Rig:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 
 from focgen.fractional.transfer import TransferFunction
 from focgen.rig.rig import UNITY, Actuator, Delays, LinearActuator, Relative, Rig, Uncertainty
 from focgen.rig.stages import STAGES
-from focgen.rig.within import is_quick
 
 EXACT = Uncertainty(Relative(0.0, 0.0), Relative(0.0, 0.0), Relative(0.0, 0.0))
 _ENDS = (-1.0, 1.0)
@@ -57,14 +56,6 @@ def transfer_of(rig: Rig, stage: str) -> TransferFunction | None:
         made: TransferFunction | None = getattr(rig, stage)
         return made
     return None if rig.actuator is None else rig.actuator.dynamics
-
-
-def kinks(rig: Rig, stages: Sequence[str], step: float) -> bool:
-    """Whether all of the ``stages`` are quick against samples of ``step`` s, so that what leaves them turns
-    within a sample as a held command jumps: lines between its readings miss some of its area."""
-    found = [transfer_of(rig, stage) for stage in stages]
-    moving = [transfer for transfer in found if transfer is not None and transfer != UNITY]
-    return bool(moving) and all(is_quick(transfer, step) for transfer in moving)
 
 
 def moved(rig: Rig, off: Uncertainty) -> Rig:

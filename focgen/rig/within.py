@@ -9,7 +9,7 @@ sample is taken from its model, and only what that leaves of the readings runs i
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from focgen.arrays import Array
 from focgen.fractional.simulation import Convolution
 from focgen.fractional.transfer import TransferFunction
 from focgen.logs.between import Course, noise_level
+from focgen.rig.corners import transfer_of
+from focgen.rig.rig import UNITY, Rig
 
 _GAUSS, _SHARES = np.polynomial.legendre.leggauss(6)
 PLACES = 0.5 * (1.0 + np.r_[_GAUSS, 1.0])  # of a sample, 0 … 1, where a course within it is known
@@ -34,6 +36,14 @@ def is_quick(regulator: TransferFunction, step: float) -> bool:
         return bool(Convolution(regulator, step).run(np.ones(3))[2] / end > _QUICK)
     except ArithmeticError:
         return False
+
+
+def kinks(rig: Rig, stages: Sequence[str], step: float) -> bool:
+    """Whether all of the ``stages`` are quick against samples of ``step`` s, so that what leaves them turns
+    within a sample as a held command jumps: lines between its readings miss some of its area."""
+    found = [transfer_of(rig, stage) for stage in stages]
+    moving = [transfer for transfer in found if transfer is not None and transfer != UNITY]
+    return bool(moving) and all(is_quick(transfer, step) for transfer in moving)
 
 
 def made_within(run: Callable[[float], Array], step: float) -> Array:
@@ -69,7 +79,7 @@ def read_within(readings: Array, made: Array, first: Array) -> Array | None:
     the rest in straight lines. ``first`` (n,): true where an experiment begins. None where the readings do
     not follow the model closely enough to tell how they run."""
     rest = readings - made[-1]
-    before = np.where(first, rest, np.r_[rest[:1], rest[:-1]])
+    before = _before(rest, first)
     missed, _ = _areas(made[None], first)
     strays = np.mean((rest - before) ** 2) - 2.0 * noise_level(rest) ** 2
     if strays > _FOLLOWS**2 * np.mean(missed**2):
@@ -97,11 +107,17 @@ def laid_on_samples(values: Array, first: Array) -> Array:
     return made
 
 
+def _before(x: Array, first: Array) -> Array:
+    """The sample before each one of a signal (…, n), the first of an experiment itself."""
+    made: Array = np.where(first, x, np.roll(x, 1, axis=-1))
+    return made
+
+
 def _areas(values: Array, first: Array) -> tuple[Array, Array]:
     """The area (powers, n) of what lines miss of inputs (powers, 7, n) in each sample, none in those at which
     an experiment begins, and its moment about the middle, in half samples."""
     at, within = values[:, -1], values[:, :-1]
-    before = np.where(first, at, np.roll(at, 1, axis=1))
+    before = _before(at, first)
     off = within - before[:, None] - PLACES[:-1, None] * (at - before)[:, None]
     off = np.where(first, 0.0, off)
     weights = np.stack([_SHARES, _SHARES * _GAUSS])

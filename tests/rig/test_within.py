@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from focgen.fractional.transfer import TransferFunction
-from focgen.rig.corners import kinks
 from focgen.rig.rig import Actuator, Rig, Signals
 from focgen.rig.within import (
     PLACES,
     by_regulator,
     course_within,
     is_quick,
+    kinks,
     laid_on_samples,
     read_within,
 )

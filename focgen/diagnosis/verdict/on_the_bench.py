@@ -131,5 +131,6 @@ def _seen_in(of: str, stage: str, rig: Rig) -> tuple[float, str]:
 def seen_as(role: str, rig: Rig | None) -> str:
     """The role of the signal that shows what is of ``role``: the output, for a curvature that is not logged
     and comes to rest behind its sensor."""
-    unread = rig is not None and role == "curvature" and rig.signals.curvature is None
-    return "output" if unread and rig is not None and np.isfinite(rig.sensor.dc_gain) else role
+    if rig is None or role != "curvature" or rig.signals.curvature is not None:
+        return role
+    return "output" if np.isfinite(rig.sensor.dc_gain) else role

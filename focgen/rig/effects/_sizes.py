@@ -44,13 +44,15 @@ def own(name: str, what: str = "", *others: str) -> Size:
     return Size(what or name, own=(name, *others))
 
 
-def _step(bench: Any, up: bool = True, fine: int = _FINE, long: int = _LONG) -> tuple[Array, Array, float]:
-    """The response to a step over the range of the input, with the effect and without, and its sample time,
-    s."""
+def _step(bench: Any, up: bool = True, fine: int = _FINE, long: int = _LONG) -> tuple[Array, float]:
+    """A step over the range of the input, and its sample time, s."""
     begin, end = (bench.low, bench.high) if up else (bench.high, bench.low)
-    x = np.r_[begin, np.full(fine * long, end)]
-    h = bench.response / fine
-    return bench.run(x, h), bench.run(x, h, False), h
+    return np.r_[begin, np.full(fine * long, end)], bench.response / fine
+
+
+def _farthest(y: Array) -> float:
+    """What is farthest from 0, with its sign."""
+    return float(y[np.argmax(np.abs(y))])
 
 
 def _to_go(bench: Any, y: Array, h: float, up: bool, effect: bool = True) -> Array:
@@ -70,8 +72,9 @@ def _of_top(bench: Any, effect: bool = True, at: float | None = None) -> float:
 
 def _further_lag(bench: Any, up: bool = True) -> float:
     """The area between both responses is the mean time by which one is later."""
-    with_it, without, h = _step(bench, up)
-    return float(np.sum(_to_go(bench, with_it, h, up) - _to_go(bench, without, h, up, False)) * h)
+    x, h = _step(bench, up)
+    with_it, without = (_to_go(bench, bench.run(x, h, effect), h, up, effect) for effect in (True, False))
+    return float(np.sum(with_it - without) * h)
 
 
 def _further_lag_down(bench: Any) -> float:
@@ -82,8 +85,8 @@ def _further_lag_down(bench: Any) -> float:
 
 def _half_way(bench: Any, up: bool) -> float:
     """When a response is half-way, s, of a step whose middle is half a sample behind its begin."""
-    y, _, h = _step(bench, up, _FINE * 5, _SETTLED)
-    left = _to_go(bench, y, h, up)
+    x, h = _step(bench, up, _FINE * 5, _SETTLED)
+    left = _to_go(bench, bench.run(x, h), h, up)
     there = np.flatnonzero(left <= 0.5)
     if not len(there) or not there[0]:
         return np.nan
@@ -97,8 +100,8 @@ def _down_over_up(bench: Any) -> float:
 
 
 def _highest_rate(bench: Any) -> float:
-    with_it, _, h = _step(bench, fine=_FINE * 5, long=_SETTLED)
-    return float(np.max(np.abs(np.diff(with_it)))) / h or np.nan
+    x, h = _step(bench, fine=_FINE * 5, long=_SETTLED)
+    return float(np.max(np.abs(np.diff(bench.run(x, h))))) / h or np.nan
 
 
 def _staircase(bench: Any, levels: Array) -> tuple[Array, Array]:
@@ -122,8 +125,7 @@ def _bow(bench: Any) -> float:
     with_it, without = (y - y[0] for y in _staircase(bench, np.linspace(bench.low, bench.high, _LEVELS)))
     if abs(without[-1]) <= _MOVES * np.max(np.abs(without)):
         return np.nan
-    bent = with_it - without * with_it[-1] / without[-1]
-    return float(bent[np.argmax(np.abs(bent))])
+    return _farthest(with_it - without * with_it[-1] / without[-1])
 
 
 def _lost(bench: Any) -> float:
@@ -153,15 +155,14 @@ def _further_creep(bench: Any) -> float:
 
 
 def _overshoot(bench: Any) -> Array:
-    with_it, without, _ = _step(bench)
+    with_it, without = (bench.run(*_step(bench), effect) for effect in (True, False))
     way = with_it[-1] - with_it[0]
     made: Array = 100.0 * (with_it - without * with_it[-1] / (without[-1] or np.nan)) / (way or np.nan)
     return made
 
 
 def _largest_overshoot(bench: Any) -> float:
-    over = _overshoot(bench)
-    return float(over[np.argmax(np.abs(over))])
+    return _farthest(_overshoot(bench))
 
 
 def _half_gone(bench: Any) -> float:
