@@ -206,8 +206,9 @@ def test_a_curve_that_stands_for_two_effects_is_told_apart():
     )
 
 
-def test_what_brings_the_whole_output_no_closer_is_not_named():
+def test_what_brings_the_whole_output_no_closer_is_not_named(monkeypatch):
     """A bend that the sensor has is kept, the opposite one is not."""
+    monkeypatch.setattr(summary, "_comes_in", lambda e, square: False)
     logs = session(11, bend=20.0)
     explanations = explain_all(RIG, logs, NUMBERS.nats, ["sensor_nonlinearity"])
     rigs = compose.compose(RIG, explanations, logs)
@@ -220,6 +221,23 @@ def test_what_brings_the_whole_output_no_closer_is_not_named():
     # but it is there: without it the output is off by far more than noise
     sorted_out = [summary.sorted_out(RIG, logs, of, explanations, False) for of in (rigs, worse)]
     assert [s.unknown for s in sorted_out] == [[], [explanations[-1]]]
+
+
+@pytest.mark.parametrize("fault, kept", [("of the valve", True), ("of the gauge", False)])
+def test_a_bend_behind_a_pressure_that_nothing_explains_is_kept_unless_its_gauge_made_it(fault, kept):
+    """A valve that sticks in a way of its own left a tenfold error, and so the rubber behind it was nothing."""
+    logs = session(11, bend=20.0 if kept else 0.0, roles=("pressure",))
+    found = []
+    for log in logs:
+        pressure = np.asarray(log["pressure"])
+        at_fault = {"pressure": pressure * (1.0 + 0.5 * pressure / np.max(pressure))}
+        another = {"command": np.roll(log["command"], 400)}  # than the one that the valve answered
+        found.append(replace(log, signals={**log.signals, **(another if kept else at_fault)}))
+    explanations = explain_all(RIG, found, NUMBERS.nats, ["sensor_nonlinearity", "gain_nonlinearity"])
+    explanations = [replace(explanations[0], best=explanations[0].nominal), *explanations[1:]]
+    assert explanations[-1].causes
+    rigs = compose.compose(RIG, explanations, found)
+    assert summary._no_closer(RIG, found, rigs, explanations) == ([] if kept else [explanations[-1]])
 
 
 def test_noise_that_stays_in_an_input_is_known_behind_a_stage_that_hums(monkeypatch):

@@ -203,14 +203,14 @@ def _at_odds(summary: Summary) -> list[Explanation]:
     Then a signal logged in between fits neither what is ahead of it nor what is behind, as of a gauge that is
     at fault: either segments make up for one another, or without any effect there is no gap at all. A path
     that one wanders is not foretold, so that only the latter tells then. Where errors add up, one may stand
-    for another."""
+    for another. And what comes in with a stage that is explained badly tells nothing of the last one."""
     explained = list(dict.fromkeys(e for e, _ in summary.causes))
     if not explained or any(is_rounded(e.causes) or e.segment.pace for e in explained):
         return []
     found, *others = (float(np.mean(summary.squares[k])) for k in ("explained", "as given", "refitted"))
     without = min(others)
     if len(explained) > 1 and not any(map(paths, explained)):
-        return explained if found > without else []
+        return explained if found > without and not _comes_in(explained[-1], without) else []
     no_gap, above = summary.floor > NUMBERS.above**2 * without, without < NUMBERS.above**2 * found
     return explained if no_gap and above else []
 
@@ -219,14 +219,23 @@ def _no_closer(
     rig: Rig, logs: Sequence[Experiment], rigs: compose.Rigs, explanations: Sequence[Explanation]
 ) -> list[Explanation]:
     """The last segment, where its effects fit its measured input but bring the whole chain's output no
-    closer: what they mend is that input. A rounding leaves more, by nature."""
+    closer: what they mend is that input. A rounding leaves more, by nature, and so does a stage ahead that is
+    explained badly."""
     last = explanations[-1]
     if not last.causes or is_rounded(last.causes):
         return []
     without = compose.compose(rig, _held(explanations, [last]), logs)
     both = (compose.simulated(r.fitted, r.placed, logs) for r in (rigs, without))
     found, bare = (compose.mean_square(logs, made) for made in both)
-    return [last] if found > bare else []
+    return [last] if found > bare and not _comes_in(last, bare) else []
+
+
+def _comes_in(e: Explanation, square: float) -> bool:
+    """Whether an error of the output, of this mean ``square``, comes in with what the last segment's input is
+    simulated as: from that input as it was read, its effects leave next to nothing of it. A gauge in between
+    that is at fault leaves no such error without them."""
+    left = float(np.mean(e.best.weighed**2)) * e.segment.level_out**2
+    return not e.segment.pace and left < NUMBERS.vain * square
 
 
 def _held(explanations: Sequence[Explanation], left_out: Sequence[Explanation]) -> list[Explanation]:
