@@ -8,9 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import lsq_linear
 
-from focgen.diagnosis.fitting.fit import WHITE, _cost, _solved, _step, fit, innovations, jacobian
+from focgen.diagnosis.fitting.fit import WHITE, _cost, _solved, fit, innovations, jacobian
 from focgen.diagnosis.hypotheses.nuisances import problem_of
 from focgen.diagnosis.hypotheses.search import best_start, footings
 from focgen.diagnosis.problem.candidates import CandidateEffect
@@ -132,36 +131,6 @@ def test_a_step_goes_nowhere_of_which_nothing_is_known(known):
     sure = slice(None) if known else slice(4)
     np.testing.assert_allclose(step[sure], wanted[sure], rtol=1e-6)
     assert known or abs(step[4]) < 1e-9
-
-
-@pytest.mark.parametrize("seed", range(40))
-def test_a_step_is_the_best_of_the_quadratic_model_within_all_bounds(seed):
-    """Numbers that make up for one another left their valley where one of them met its end."""
-    rng = np.random.default_rng(seed)
-    k = int(rng.integers(2, 12))
-    rows = rng.standard_normal((40, k)) @ (np.eye(k) + 2.0 * rng.standard_normal((k, k)))
-    now = 3.0 * rng.standard_normal(40)
-    low, high = np.full(k, -1.0), np.full(k, 1.0)
-    vector = np.where(rng.random(k) < 0.3, rng.choice([-1.0, 1.0], k), rng.uniform(-1.0, 1.0, k))
-    normal, slope = rows.T @ rows, rows.T @ (rows @ vector + now)
-    room = np.maximum(low - vector, -1.0) - 1e-9, np.minimum(high - vector, 1.0) + 1e-9
-    best = lsq_linear(rows, -(rows @ vector + now), room, method="bvls").x
-    moved = -_step(normal, slope, 0.0, vector, low, high)
-
-    def model(d):
-        return 0.5 * d @ normal @ d + slope @ d
-
-    assert np.all((room[0] <= moved) & (moved <= room[1]))
-    assert model(moved) < model(best) + 1e-6 * abs(model(best))
-    assert model(best) < 0.0
-
-
-def test_a_step_is_short_where_little_is_known_and_keeps_what_is_fixed():
-    normal, slope = np.diag([4.0, 4.0, 0.0]), np.array([2.0, -8.0, 0.0])
-    low, high = np.array([-9.0, -9.0, 1.0]), np.array([9.0, 9.0, 1.0])
-    np.testing.assert_allclose(
-        _step(normal, slope, 1.0, np.array([0.0, 0.0, 1.0]), low, high), [0.25, -1.0, 0.0], atol=1e-6
-    )
 
 
 def test_a_vector_that_is_hopelessly_unlikely_costs_more_than_any_other_without_a_warning(problem):

@@ -16,7 +16,6 @@ from focgen.rig.kernels import products
 STEP = 1e-4
 _SURE, _NOTHING = 1e-10, 1e-12  # of the largest of a matrix: what is sure to be known, and what is not
 FIXED = 1e-6  # a parameter whose bounds are as close is none
-_ENDS = 3  # times every number may meet an end, or leave it, in one step
 _STALE = 2  # iterations that rows of the Jacobian are kept for
 _HOPELESS = 600.0  # exponent: so unlikely, no fit is better than another, and exp would pass a float's end
 _LAGGING = 0.01  # of what a fit is behind another: one that gains less by an iteration will not reach it
@@ -229,38 +228,17 @@ def _step(
     low: np.ndarray,
     high: np.ndarray,
 ) -> np.ndarray:
-    """The damped step to the least of the quadratic model within the bounds, and within 1 of every number.
-    Were each number clipped by itself, those that make up for one another would leave the valley that they
-    lie in."""
-    scale = np.diag(normal)
-    matrix = normal + damping * np.diag(scale + 1e-9 * max(scale.max(), 1e-30) + 1e-12)
-    return -_least_within(matrix, slope, np.maximum(low - vector, -1.0), np.minimum(high - vector, 1.0))
-
-
-def _least_within(matrix: np.ndarray, slope: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """The d (k,) with low ≤ d ≤ high, 0 among them, of the least ½ dᵀ matrix d + slopeᵀ d: straight to the
-    least of what is free, held where that meets an end, and free again where it pulls away from it (the
-    primal active-set method; Nocedal and Wright, Numerical optimization, 2006, section 16.5)."""
-    moved = np.zeros_like(slope)
-    free = ~((low >= 0.0) & (slope > 0.0) | (high <= 0.0) & (slope < 0.0))
-    for _ in range(_ENDS * len(slope)):
-        if free.any():
-            there = slope[free] + matrix[np.ix_(free, ~free)] @ moved[~free]
-            way = np.zeros_like(slope)
-            way[free] = -_solved(matrix[np.ix_(free, free)], there) - moved[free]
-            room = np.where(way > 0.0, high - moved, low - moved)
-            reach = np.divide(room, way, out=np.full_like(way, np.inf), where=way != 0.0)
-            first = int(np.argmin(reach))
-            moved = np.clip(moved + min(reach[first], 1.0) * way, low, high)
-            if reach[first] < 1.0:
-                free[first], moved[first] = False, high[first] if way[first] > 0.0 else low[first]
-                continue
-        pull = np.where(high > low, slope + matrix @ moved, 0.0)
-        away = ~free & ((moved == low) & (pull < 0.0) | (moved == high) & (pull > 0.0))
-        if not away.any():
-            break
-        free[int(np.argmax(np.abs(pull) * away))] = True
-    return moved
+    """The damped step, with parameters held that stand at a bound and push beyond it."""
+    held = ((vector <= low) & (slope > 0)) | ((vector >= high) & (slope < 0))
+    free = ~held
+    step = np.zeros_like(vector)
+    if free.any():
+        scale = np.diag(normal)[free]
+        matrix = normal[np.ix_(free, free)]
+        matrix.flat[:: len(scale) + 1] += damping * (scale + 1e-9 * max(scale.max(), 1e-30) + 1e-12)
+        step[free] = _solved(matrix, slope[free])
+    made: np.ndarray = np.clip(step, -1.0, 1.0)
+    return made
 
 
 def _solved(matrix: np.ndarray, slope: np.ndarray) -> np.ndarray:
