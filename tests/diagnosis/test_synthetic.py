@@ -225,7 +225,7 @@ def test_what_brings_the_whole_output_no_closer_is_not_named(monkeypatch):
 
 @pytest.mark.parametrize("fault, kept", [("of the valve", True), ("of the gauge", False)])
 def test_a_bend_behind_a_pressure_that_nothing_explains_is_kept_unless_its_gauge_made_it(fault, kept):
-    """A valve that sticks in a way of its own left a tenfold error, and so the rubber behind it was nothing."""
+    """A valve sticks in a way of its own, ten times the noise was left, and the rubber behind it was nothing."""
     logs = session(11, bend=20.0 if kept else 0.0, roles=("pressure",))
     found = []
     for log in logs:
@@ -238,6 +238,26 @@ def test_a_bend_behind_a_pressure_that_nothing_explains_is_kept_unless_its_gauge
     assert explanations[-1].causes
     rigs = compose.compose(RIG, explanations, found)
     assert summary._no_closer(RIG, found, rigs, explanations) == ([] if kept else [explanations[-1]])
+
+
+class _Explained:
+    """Of an explanation what tells whether it is at odds with another one: what it leaves of its level."""
+
+    def __init__(self, left):
+        self.causes, self.segment = (), SimpleNamespace(pace=0.0, level_out=2.0)
+        problem = SimpleNamespace(candidates=[])
+        self.best = SimpleNamespace(weighed=np.array([left, -left]), problem=problem)
+
+
+@pytest.mark.parametrize("left, at_odds", [(0.22, False), (0.23, True)])
+def test_effects_that_leave_more_than_none_are_at_odds_unless_the_last_one_explains_what_was_read(
+    left, at_odds
+):
+    """A fifth of the mean square that the chain leaves without them is 0.2, and the level is 2."""
+    each = [_Explained(1.0), _Explained(left)]
+    squares = {"explained": np.array([1.2]), "as given": np.array([1.0]), "refitted": np.array([1.1])}
+    told = summary.Summary(None, [(e, None) for e in each], {}, squares, 0.01, None)
+    assert summary._at_odds(told) == (each if at_odds else [])
 
 
 def test_noise_that_stays_in_an_input_is_known_behind_a_stage_that_hums(monkeypatch):
