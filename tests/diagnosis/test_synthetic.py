@@ -225,7 +225,7 @@ def test_what_brings_the_whole_output_no_closer_is_not_named(monkeypatch):
 
 @pytest.mark.parametrize("fault, kept", [("of the valve", True), ("of the gauge", False)])
 def test_a_bend_behind_a_pressure_that_nothing_explains_is_kept_unless_its_gauge_made_it(fault, kept):
-    """A valve sticks in a way of its own, ten times the noise was left, and the rubber behind it was nothing."""
+    """A valve that sticks in a way of its own left a tenfold error, and the rubber behind it was nothing."""
     logs = session(11, bend=20.0 if kept else 0.0, roles=("pressure",))
     found = []
     for log in logs:
