@@ -38,7 +38,7 @@ from focgen.diagnosis.problem.smooth import freed, is_explained, slow_rest, stra
 from focgen.diagnosis.problem.within import bent_within
 from focgen.diagnosis.verdict import compose
 from focgen.diagnosis.verdict.at_the_output import seen_at_the_output
-from focgen.diagnosis.verdict.in_between import hiding, leaves_far_less, tell_the_same, without
+from focgen.diagnosis.verdict.in_between import gives_up, hiding, leaves_far_less, tell_the_same, without
 from focgen.diagnosis.verdict.unexplained import is_noise, is_unknown
 from focgen.logs.experiment import Experiment
 from focgen.progress import step
@@ -98,12 +98,13 @@ def _as_fitted(
 
 def unhidden(found: Findings, session: tuple[Experiment, ...], bootstrap: int) -> Findings:
     """What is found, made anew without a signal in between whose noise hides what the output shows, where
-    that leaves far less of the output."""
+    that leaves far less of the output, and gives up nothing that the signal itself shows."""
     for role in hiding(found.rigs, found.session, found.explanations):
         step(f"without the {role}")
         bare = found_in(found.nominal, without(session, role), None, bootstrap)
         closer = leaves_far_less(bare.rigs, bare.session, found.rigs, found.session)
-        more = not tell_the_same(bare.explanations, found.explanations)
+        each = bare.explanations, found.explanations
+        more = not (tell_the_same(*each) or gives_up(*each, role))
         if closer and more and not any(map(is_unknown, bare.explanations)):
             return bare
     return found

@@ -6,9 +6,11 @@ Red when a session with such a gauge tells less than the same session without it
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
+from focgen.diagnosis import findings
 from focgen.diagnosis.diagnose import diagnose
 from tests.diagnosis_rig import RIG, session
 
@@ -71,3 +73,41 @@ def test_a_gauge_that_is_dropped_is_still_looked_at():
     off = [replace(log, signals=dict(log.signals) | {"curvature": 100.0 * log["curvature"]}) for log in logs]
     found = diagnose(RIG, off, pictures=False)
     assert any("curvature in a unit 100 times smaller?" in warning for warning in found.warnings)
+
+
+def _told(exit, *sets):
+    """An explanation of the segment up to a signal, with these sets of families."""
+    rivals = [
+        [SimpleNamespace(effect=name, stage="", odds=9.0, off=-9.0) for name in names] for names in sets
+    ]
+    return SimpleNamespace(
+        segment=SimpleNamespace(exit=exit), causes=[SimpleNamespace(rivals=r) for r in rivals]
+    )
+
+
+@pytest.mark.parametrize(
+    "exit, alone, kept",
+    [
+        ("pressure", ["hysteresis"], True),
+        ("pressure", ["hysteresis", "valve_stiction"], False),
+        ("output", ["hysteresis"], False),  # that is of the noise that the gauge passes on
+    ],
+)
+def test_what_a_signal_shows_is_not_given_up_for_what_the_output_tells_without_it(
+    monkeypatch, exit, alone, kept
+):
+    """A valve that sticks before a gauge that is bent was ``hysteresis``, 0.95: the gauge was left out."""
+    seen = SimpleNamespace(
+        explanations=(_told(exit, ["valve_stiction"]),), rigs=None, session=(), nominal=None
+    )
+    bare = SimpleNamespace(explanations=(_told("output", alone),), rigs=None, session=())
+    for name, answer in {
+        "hiding": ["pressure"],
+        "without": (),
+        "found_in": bare,
+        "leaves_far_less": True,
+        "tell_the_same": False,
+        "is_unknown": False,
+    }.items():
+        monkeypatch.setattr(findings, name, lambda *a, answer=answer: answer)
+    assert findings.unhidden(seen, (), 0) is (seen if kept else bare)

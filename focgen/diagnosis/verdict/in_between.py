@@ -50,6 +50,14 @@ def tell_the_same(bare: Sequence[Explanation], found: Sequence[Explanation]) -> 
     return all(any(name in rivals for name in named) for rivals in seen)
 
 
+def gives_up(bare: Sequence[Explanation], found: Sequence[Explanation], role: str) -> bool:
+    """Whether an effect that the signal itself shows is in none of the sets without it. What is seen in a
+    stage's own signal is there, however much of the output another one would explain."""
+    shown = {c.rivals[0].effect for e in found if e.segment.exit == role for c in e.causes}
+    told = {r.effect for e in bare for c in e.causes for r in tied(c.rivals)[0]}
+    return not shown <= told
+
+
 def without(logs: Sequence[Experiment], role: str) -> tuple[Experiment, ...]:
     """The session as if a signal had not been logged, with a note on that."""
     note = f"the {role} is so noisy that it hides what the output shows: diagnosed without it"
