@@ -86,20 +86,19 @@ def _told(exit, *sets):
 
 
 @pytest.mark.parametrize(
-    "exit, alone, kept",
+    "exit, shown, alone, kept",
     [
-        ("pressure", ["hysteresis"], True),
-        ("pressure", ["hysteresis", "valve_stiction"], False),
-        ("output", ["hysteresis"], False),  # that is of the noise that the gauge passes on
+        ("pressure", ["valve_stiction"], ["hysteresis"], True),
+        ("pressure", ["valve_stiction"], ["hysteresis", "valve_stiction"], False),
+        ("pressure", ["slow_regulator", "valve_asymmetry"], ["valve_asymmetry"], False),
+        ("output", ["valve_stiction"], ["hysteresis"], False),  # of the noise that the gauge passes on
     ],
 )
 def test_what_a_signal_shows_is_not_given_up_for_what_the_output_tells_without_it(
-    monkeypatch, exit, alone, kept
+    monkeypatch, exit, shown, alone, kept
 ):
     """A valve that sticks before a gauge that is bent was ``hysteresis``, 0.95: the gauge was left out."""
-    seen = SimpleNamespace(
-        explanations=(_told(exit, ["valve_stiction"]),), rigs=None, session=(), nominal=None
-    )
+    seen = SimpleNamespace(explanations=(_told(exit, shown),), rigs=None, session=(), nominal=None)
     bare = SimpleNamespace(explanations=(_told("output", alone),), rigs=None, session=())
     for name, answer in {
         "hiding": ["pressure"],

@@ -243,18 +243,21 @@ def test_a_bend_behind_a_pressure_that_nothing_explains_is_kept_unless_its_gauge
 class _Explained:
     """Of an explanation what tells whether it is at odds with another one: what it leaves of its level."""
 
-    def __init__(self, left):
-        self.causes, self.segment = (), SimpleNamespace(pace=0.0, level_out=2.0)
+    def __init__(self, left, exit="output"):
+        self.causes, self.segment = (), SimpleNamespace(pace=0.0, level_out=2.0, exit=exit)
         problem = SimpleNamespace(candidates=[])
         self.best = SimpleNamespace(weighed=np.array([left, -left]), problem=problem)
 
 
-@pytest.mark.parametrize("left, at_odds", [(0.22, False), (0.23, True)])
+@pytest.mark.parametrize(
+    "left, exit, at_odds",
+    [(0.22, "output", False), (0.23, "output", True), (0.22, "curvature", True)],  # that is in another unit
+)
 def test_effects_that_leave_more_than_none_are_at_odds_unless_the_last_one_explains_what_was_read(
-    left, at_odds
+    left, exit, at_odds
 ):
     """A fifth of the mean square that the chain leaves without them is 0.2, and the level is 2."""
-    each = [_Explained(1.0), _Explained(left)]
+    each = [_Explained(1.0), _Explained(left, exit)]
     squares = {"explained": np.array([1.2]), "as given": np.array([1.0]), "refitted": np.array([1.1])}
     told = summary.Summary(None, [(e, None) for e in each], {}, squares, 0.01, None)
     assert summary._at_odds(told) == (each if at_odds else [])

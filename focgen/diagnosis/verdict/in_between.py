@@ -51,11 +51,14 @@ def tell_the_same(bare: Sequence[Explanation], found: Sequence[Explanation]) -> 
 
 
 def gives_up(bare: Sequence[Explanation], found: Sequence[Explanation], role: str) -> bool:
-    """Whether an effect that the signal itself shows is in none of the sets without it. What is seen in a
-    stage's own signal is there, however much of the output another one would explain."""
-    shown = {c.rivals[0].effect for e in found if e.segment.exit == role for c in e.causes}
-    told = {r.effect for e in bare for c in e.causes for r in tied(c.rivals)[0]}
-    return not shown <= told
+    """Whether a cause that the signal itself shows has none of its families in a set without it. What is seen
+    in a stage's own signal is there, however much of the output another one would explain."""
+
+    def families(e: Explanation) -> list[set[str]]:
+        return [{r.effect for r in tied(c.rivals)[0]} for c in e.causes]
+
+    told = set[str]().union(*(names for e in bare for names in families(e)))
+    return any(told.isdisjoint(names) for e in found if e.segment.exit == role for names in families(e))
 
 
 def without(logs: Sequence[Experiment], role: str) -> tuple[Experiment, ...]:

@@ -234,8 +234,9 @@ def _comes_in(e: Explanation, square: float) -> bool:
     """Whether an error of the output, of this mean ``square``, comes in with what the last segment's input is
     simulated as: from that input as it was read, its effects leave next to nothing of it. A gauge in between
     that is at fault leaves no such error without them."""
-    left = float(np.mean(e.best.weighed**2)) * e.segment.level_out**2
-    return not e.segment.pace and left < NUMBERS.vain * square
+    if e.segment.exit != "output" or e.segment.pace:
+        return False
+    return float(np.mean(e.best.weighed**2)) * e.segment.level_out**2 < NUMBERS.vain * square
 
 
 def _held(explanations: Sequence[Explanation], left_out: Sequence[Explanation]) -> list[Explanation]:
