@@ -208,7 +208,7 @@ def test_a_curve_that_stands_for_two_effects_is_told_apart():
 
 def test_what_brings_the_whole_output_no_closer_is_not_named(monkeypatch):
     """A bend that the sensor has is kept, the opposite one is not."""
-    monkeypatch.setattr(summary, "_comes_in", lambda e, square: False)
+    monkeypatch.setattr(summary, "_comes_in", lambda e, square: False)  # its own segment fits, turned or not
     logs = session(11, bend=20.0)
     explanations = explain_all(RIG, logs, NUMBERS.nats, ["sensor_nonlinearity"])
     rigs = compose.compose(RIG, explanations, logs)

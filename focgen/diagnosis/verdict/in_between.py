@@ -46,19 +46,20 @@ def tell_the_same(bare: Sequence[Explanation], found: Sequence[Explanation]) -> 
     """Whether what is found without the signal may all be what was ``found`` with it. Then that tells the
     stages as well, and what it leaves more is the error of its numbers."""
     named = [(c.rivals[0].effect, c.rivals[0].stage) for e in found for c in e.causes]
-    seen = [{(r.effect, r.stage) for r in tied(c.rivals)[0]} for e in bare for c in e.causes]
-    return all(any(name in rivals for name in named) for rivals in seen)
+    return all(any(name in rivals for name in named) for rivals in _sets(bare))
 
 
 def gives_up(bare: Sequence[Explanation], found: Sequence[Explanation], role: str) -> bool:
     """Whether a cause that the signal itself shows has none of its families in a set without it. What is seen
     in a stage's own signal is there, however much of the output another one would explain."""
+    told = {effect for rivals in _sets(bare) for effect, _ in rivals}
+    shown = _sets([e for e in found if e.segment.exit == role])
+    return any(told.isdisjoint(effect for effect, _ in rivals) for rivals in shown)
 
-    def families(e: Explanation) -> list[set[str]]:
-        return [{r.effect for r in tied(c.rivals)[0]} for c in e.causes]
 
-    told = set[str]().union(*(names for e in bare for names in families(e)))
-    return any(told.isdisjoint(names) for e in found if e.segment.exit == role for names in families(e))
+def _sets(explanations: Sequence[Explanation]) -> list[set[tuple[str, str]]]:
+    """Of every cause the effects, and their stages, that it may be."""
+    return [{(r.effect, r.stage) for r in tied(c.rivals)[0]} for e in explanations for c in e.causes]
 
 
 def without(logs: Sequence[Experiment], role: str) -> tuple[Experiment, ...]:
